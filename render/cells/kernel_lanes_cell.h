@@ -31,20 +31,31 @@ SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, v
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
 }
 
+/* Transforms one vertex per lane, for one half of the lanes, from world coordinates into tile space, in double. Returns
+ * the vertices' distances from the eye or, if the camera is orthographic, the scale of the job's space. */
+SIMD_INLINE kernel_f64 kernel_lanes_transform_half(const kernel_frame *f, const kernel_tile *tile,
+                                                   const kernel_f64 (*world)[2], int half, kernel_f64 out[3])
+{
+    const double *eye = f->job->camera.eye;
+    kernel_f64 d[3], at[3];
+    for (int a = 0; a < 3; a++) d[a] = world[a][half] - eye[a];
+    for (int a = 0; a < 3; a++)
+        at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+    const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+    out[0] = at[0] - tile->centre_x * depth;
+    out[1] = at[1] - tile->centre_y * depth;
+    out[2] = at[2] - tile->depth_shift;
+    return depth;
+}
+
 /* Transforms one vertex per lane from world coordinates into tile space. */
 SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile, const kernel_f64 (*world)[2],
                                         vf out[3])
 {
-    const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {
-        kernel_f64 d[3], at[3];
-        for (int a = 0; a < 3; a++) d[a] = world[a][half] - eye[a];
-        for (int a = 0; a < 3; a++)
-            at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-        const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_f64_store_half_of_vector(&out[0], half, at[0] - tile->centre_x * depth);
-        kernel_f64_store_half_of_vector(&out[1], half, at[1] - tile->centre_y * depth);
-        kernel_f64_store_half_of_vector(&out[2], half, at[2] - tile->depth_shift);
+        kernel_f64 at[3];
+        kernel_lanes_transform_half(f, tile, world, half, at);
+        for (int a = 0; a < 3; a++) kernel_f64_store_half_of_vector(&out[a], half, at[a]);
     }
 }
 

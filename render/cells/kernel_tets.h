@@ -1,6 +1,6 @@
 /* Computes the interval of rays in tets. A ray crosses two or none of a tet's four faces (kernel_cell.h). The same
  * source is compiled for a packet of rays that share one tet, and for rays that each have a tet of their own:
- * kernel_tets.is_one is a compile-time constant wherever these functions are inlined. */
+ * kernel_tets.is_one and is_uniform are compile-time constants wherever these functions are inlined. */
 #ifndef RENDER_KERNEL_TETS_H
 #define RENDER_KERNEL_TETS_H
 
@@ -15,19 +15,23 @@
 #include "simd.h"
 
 /* Rays and their tets. is_one: `packet` has the rays, and all share the tet `one`. Otherwise lane_rays has the rays,
- * and each has its own tet, in the lane lane_rays->lane of `transformed`. */
+ * and each has its own tet, in the lane lane_rays->lane of `transformed`. is_uniform: that is `lane` for all rays. */
 typedef struct kernel_tets {
     bool is_one;
     const kernel_packet *packet;
     const kernel_cell *one;
     const kernel_lane_rays *lane_rays;
     const kernel_transformed_tets *transformed;
+    bool is_uniform;
+    int lane;
 } kernel_tets;
 
-/* Expands to a vector with one number of each ray's tet: the member of_one of kernel_cell if all rays share a tet,
- * otherwise the member of_transformed of kernel_transformed_tets. */
+/* Expands to a vector with one number of each ray's tet: the member of_one of kernel_cell if is_one is set, otherwise
+ * the member of_transformed of kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_transformed)                                                                   \
-    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_transformed, (t)->lane_rays->lane))
+    ((t)->is_one       ? vf_set((t)->one->of_one)                                                                      \
+     : (t)->is_uniform ? vf_set((t)->transformed->of_transformed[(t)->lane])                                           \
+                       : vf_permute((t)->transformed->of_transformed, (t)->lane_rays->lane))
 
 /* Returns a copy of *t, to be passed to a function that is not inlined, so that the original stays in registers. rays:
  * memory for a copy of the lane rays. */
@@ -37,6 +41,7 @@ SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays 
     if (t->is_one) return out;
     *rays = *t->lane_rays;
     out.lane_rays = rays;
+    out.is_uniform = false;
     return out;
 }
 
@@ -143,6 +148,17 @@ SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_
     ends[1] = kernel_sums_select(hit[3], &sums[3], &b);
 }
 
+/* kernel_tets_first_face() returns the number of the face that kernel_tets_select_crossed_faces() selects for ends[0],
+ * kernel_tets_second_face() that for ends[1]. */
+SIMD_INLINE vi kernel_tets_first_face(const vm hit[4])
+{
+    return vi_select(hit[0], vi_set(0), vi_select(hit[1], vi_set(1), vi_set(2)));
+}
+SIMD_INLINE vi kernel_tets_second_face(const vm hit[4])
+{
+    return vi_select(hit[3], vi_set(3), vi_select(hit[2], vi_set(2), vi_set(1)));
+}
+
 /* Computes depth and values of both crossings by dividing their sums by the sum of the weights. The nearer crossing
  * becomes the begin of the interval (t_in and so on), the other its end. */
 SIMD_INLINE void kernel_tets_set_interval(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
@@ -172,22 +188,18 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
 SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                               bool has_colour, kernel_sums ends[2])
 {
-    vf x[4], y[4];
+    vf exact[KERNEL_TET_EDGES];
     kernel_sums sums[4];
     vm hit[4];
-    kernel_tets_project(t, x, y);
+    kernel_tets_edges_projected(t, exact);
     kernel_tets_find_crossed_faces(rays, e, hit);
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
-        const int i = face[0], j = face[1], k = face[2];
-        vf ij = e[(int)face[3]], jk = e[(int)face[4]], ik = e[(int)face[5]];
-        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_weight(ij, jk, ik));
-        if (vm_any(weak)) {
-            ij = vf_select(weak, kernel_edge_between(x[i], y[i], x[j], y[j]), ij);
-            jk = vf_select(weak, kernel_edge_between(x[j], y[j], x[k], y[k]), jk);
-            ik = vf_select(weak, kernel_edge_between(x[i], y[i], x[k], y[k]), ik);
-        }
-        sums[n] = kernel_tets_weighted_sums(t, face, ij, jk, ik, has_colour);
+        const int ij = face[3], jk = face[4], ik = face[5];
+        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_weight(e[ij], e[jk], e[ik]));
+        sums[n] =
+            kernel_tets_weighted_sums(t, face, vf_select(weak, exact[ij], e[ij]), vf_select(weak, exact[jk], e[jk]),
+                                      vf_select(weak, exact[ik], e[ik]), has_colour);
     }
     kernel_tets_select_crossed_faces(hit, sums, ends);
 }
@@ -205,14 +217,14 @@ kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES
         kernel_tets_choose_in_double(&several, rays, e, has_colour, ends);
 }
 
-/* Computes the depths at which the rays enter and leave their tets, and the values there. The weighted sums
- * (kernel_sums) of all four faces are computed without branches; then those of the two faces that each ray crosses are
- * selected. */
-SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pencil, bool has_colour,
+/* Computes the depths at which the rays enter and leave their tets, the values there, and the rays that cross each face
+ * (hit). The weighted sums (kernel_sums) of all four faces are computed without branches; then those of the two faces
+ * that each ray crosses are selected. */
+SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pencil, bool has_colour, vm hit[4],
                                       kernel_interval *out)
 {
     vf e[KERNEL_TET_EDGES];
-    vm hit[4], weak[4];
+    vm weak[4];
     kernel_sums sums[4], ends[2];
     kernel_tets_edges(t, rays, is_pencil, e);
     kernel_tets_find_crossed_faces(rays, e, hit);
@@ -240,28 +252,39 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
 
 /* ---- packets and one tet ---- */
 
-SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
-{
-    const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
-    vf e[KERNEL_TET_EDGES];
-    kernel_tets_edges(&tet, rays, p->is_pencil, e);
-    kernel_tets_find_crossed_faces(rays, e, hit);
-}
-
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
 {
     const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
-    kernel_tets_interval(&tet, rays, p->is_pencil, false, out);
+    vm hit[4];
+    kernel_tets_interval(&tet, rays, p->is_pencil, false, hit, out);
 }
 
 /* ---- rays with a tet each ---- */
+
+/* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_pencil: whether the edges'
+ * lines are used (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
+SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
+                                       bool is_pencil, bool has_colour, vm hit[4], kernel_interval *out)
+{
+    const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
+    kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
+}
 
 /* has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                           bool has_colour, kernel_interval *out)
 {
-    const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
-    kernel_tets_interval(&tets, r->active, true, has_colour, out);
+    vm hit[4];
+    kernel_tet_rays_cross(transformed, r, true, has_colour, hit, out);
+}
+
+/* Does the same as kernel_tet_rays_interval() without colours, for rays that all have the tet in the given lane. */
+SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
+                                                 int lane, kernel_interval *out)
+{
+    const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = true, .lane = lane};
+    vm hit[4];
+    kernel_tets_interval(&tets, r->active, true, false, hit, out);
 }
 
 #endif

@@ -29,8 +29,8 @@ typedef struct kernel_transformed_tets {
     vi vertex[4];
 } kernel_transformed_tets;
 
-/* Reads the vertices and sorts them by coordinates. A bubble sort is used, because it keeps the order of vertices with
- * equal coordinates. */
+/* Reads the vertices, with their values unless these belong to cells, and sorts them by coordinates. A bubble sort is
+ * used, because it keeps the order of vertices with equal coordinates. */
 SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
                                          int32_t (*const vertices)[SIMD_WIDTH])
 {
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const ker
             kernel_sorted_swap(&h, is_narrow, kernel_raw_before(is_narrow, h.at[i + 1], h.at[i]), i, i + 1);
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = h.vertex[i];
-        kernel_numbers_gather(&p->values, h.vertex[i], out->values[i]);
+        if (!p->is_by_cell) kernel_numbers_gather(&p->values, h.vertex[i], out->values[i]);
         for (int a = 0; a < 3; a++) kernel_raw_widen(is_narrow, &h.at[i][a], out->world[i][a]);
     }
 }
@@ -87,19 +87,21 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     }
 }
 
-/* Transforms tets whose world coordinates are given in the order of coordinates. */
+/* Transforms tets whose world coordinates are given in the order of coordinates. is_pencil: whether rays need the edge
+ * functions (kernel_packet). */
 static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transformed_tets *out, const kernel_frame *f,
-                                                                   const kernel_tile *tile)
+                                                                   const kernel_tile *tile, bool is_pencil)
 {
     kernel_transformed_positions(out, f, tile);
-    kernel_transformed_lines(out, f, tile);
+    if (is_pencil) kernel_transformed_lines(out, f, tile);
 }
 
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
- * lanes get the vertices of the first tet. */
+ * lanes get the vertices of the first tet. If values belong to cells, they are not read. is_pencil: as
+ * above. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
-                                                            int32_t vertices[4][SIMD_WIDTH], int count)
+                                                            int32_t vertices[4][SIMD_WIDTH], int count, bool is_pencil)
 {
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
@@ -107,35 +109,21 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
         kernel_transformed_sort(out, p, true, vertices);
     else
         kernel_transformed_sort(out, p, false, vertices);
-    kernel_transform_sorted_tets(out, f, tile);
+    kernel_transform_sorted_tets(out, f, tile, is_pencil);
 }
 
-/* Copies the tet in lane n to a kernel_cell, with all float32 data that rays need. */
-SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
+/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. is_pencil: as above.
+ */
+static __attribute__((noinline, unused)) void kernel_transform_single_tet(kernel_transformed_tets *out,
+                                                                          const kernel_cell *c, const kernel_frame *f,
+                                                                          const kernel_tile *tile, bool is_pencil)
 {
-    c->type = GRID_TET;
-    c->count = 4;
-    c->is_finite = c->is_transformed = c->has_lines = true;
-    for (int i = 0; i < 4; i++) {
-        c->x[i] = transformed->at[0][i][n];
-        c->y[i] = transformed->at[1][i][n];
-        c->z[i] = transformed->at[2][i][n];
-        c->f[i] = transformed->f[i][n];
-        c->least[i] = transformed->least[i][n];
-    }
-    for (int i = 0; i < KERNEL_TET_EDGES; i++)
-        c->lines[i] =
-            (kernel_line){transformed->c[i][n], transformed->cu[i][n], transformed->cv[i][n], transformed->bound[i][n]};
-    c->doubt = transformed->doubt[n];
-}
-
-/* Copies the positions and values of the tet in lane n, in double, to a kernel_cell. */
-SIMD_INLINE void kernel_transformed_tets_double(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
-{
-    for (int i = 0; i < 4; i++) {
-        c->values[i] = kernel_halves_lane(transformed->values[i], n);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_halves_lane(transformed->world[i][a], n);
-    }
+    for (int i = 0; i < 4; i++)
+        for (int half = 0; half < 2; half++) {
+            out->values[i][half] = c->values[i] - (kernel_f64){0};
+            for (int a = 0; a < 3; a++) out->world[i][a][half] = c->world[i][a] - (kernel_f64){0};
+        }
+    kernel_transform_sorted_tets(out, f, tile, is_pencil);
 }
 
 #endif

@@ -323,7 +323,8 @@ typedef struct kernel_lane_rays {
      * packets (kernel_pixel_position()) */
     vi lane, at;
     kernel_rays rays;
-    /* lanes that have a ray; active, u and v are set only by kernel_lane_rays_begin() */
+    /* lanes that have a ray; active, u and v are set only by kernel_lane_rays_begin() and kernel_lane_rays_of_packet()
+     */
     vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
     vf far;  /* t of the ray's nearest hit so far (kernel_packet.t_far); set only when surfaces are traced */

@@ -31,19 +31,6 @@ SIMD_INLINE kernel_f64_floats kernel_f64_narrow(kernel_f64 v)
     return __builtin_convertvector(v, kernel_f64_floats);
 }
 
-/* Returns the mask of half the lanes, the first half (half = 0) or the second half (half = 1), for vectors of
- * doubles. */
-SIMD_INLINE kernel_f64_mask kernel_f64_mask_of_half(vm m, int half)
-{
-    typedef int32_t kernel_f64_ints __attribute__((vector_size(4 * KERNEL_HALF)));
-    int32_t lanes[SIMD_WIDTH];
-    kernel_f64_ints ints;
-    const vi all = (vi)vf_select(m, (vf)vi_set(-1), (vf)vi_set(0));
-    memcpy(lanes, &all, sizeof all);
-    memcpy(&ints, lanes + half * KERNEL_HALF, sizeof ints);
-    return __builtin_convertvector(ints, kernel_f64_mask);
-}
-
 SIMD_INLINE kernel_f64 kernel_f64_select(kernel_f64_mask m, kernel_f64 a, kernel_f64 b)
 {
     return (kernel_f64)(((kernel_f64_mask)a & m) | ((kernel_f64_mask)b & ~m));

@@ -73,7 +73,7 @@ static __attribute__((noinline)) void kernel_batch_fetch_singly(const kernel_til
             for (int a = 0; a < 3; a++) b->tets.world[i][a][half][lane] = c.world[i][a];
         }
     }
-    kernel_transform_sorted_tets(&b->tets, t->frame, &t->tile);
+    kernel_transform_sorted_tets(&b->tets, t->frame, &t->tile, true);
 }
 
 /* Reads the colour field at the vertices of the cells, in the domain of its transfer function. */
@@ -97,7 +97,7 @@ static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace
     if (queued->is_fetched_singly) {
         kernel_batch_fetch_singly(t, b, queued);
     } else {
-        kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
+        kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count, true);
         for (int i = 0; (layer->colour_map || layer->lines) && i < 4; i++)
             for (int n = 0; n < SIMD_WIDTH; n++) b->vertices[i][n] = b->tets.vertex[i][n];
     }

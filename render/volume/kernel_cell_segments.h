@@ -1,5 +1,5 @@
-/* Computes the segments of rays in cells (kernel_segments.h defines the terms): in tets, polyhedra and constant cells,
- * where the field is linear along a ray and only surfaces cut its interval; and, by bisection, in parts of intervals in
+/* Computes the segments of rays in cells (kernel_segments.h defines the terms): in polyhedra and constant cells, where
+ * the field is linear along a ray and only surfaces cut its interval; and, by bisection, in parts of intervals in
  * hexes, wedges and pyramids. */
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
@@ -19,7 +19,6 @@
 #include "kernel_polyhedron.h"
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
-#include "kernel_tets.h"
 #include "kernel_types.h"
 #include "render_polyhedra.h"
 #include "simd.h"
@@ -435,42 +434,6 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
 }
 
 /* ---- cells in which the field is linear ---- */
-
-/* Returns a tet's interval as a segment, with its length in unit distances. It is computed in double if list->is_double
- * is set; only then `faces` is read. */
-SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const kernel_segments *list,
-                                                   const kernel_cell *c, const kernel_double_face faces[4],
-                                                   const kernel_interval *i)
-{
-    kernel_unit_segment run = kernel_unit_segment_of(i->t_out - i->t_in, i->v_in, i->v_out);
-    if (list->is_double) kernel_tet_segment_in_double(p, c, faces, list->u, list->v, i->mask, &run);
-    run.length *= list->per_t;
-    return run;
-}
-
-/* Adds the rays' intervals in a tet as one segment each, which only surfaces cut. faces: the tet's faces in double
- * (kernel_double_compute_faces()); read only if list->is_double is set. */
-static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segments *list, const kernel_cell *c,
-                                                          const kernel_double_face faces[4], vm rays)
-{
-    kernel_interval i;
-    kernel_tet_interval(p, c, rays, &i);
-    if (!vm_any(i.mask)) return;
-    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(list->t_cut, i.t_out));
-    if (list->cut) cut = vm_or(cut, vf_lt(kernel_next_cut(p, list, i.t_in, true), i.t_out));
-    cut = vm_and(i.mask, cut);
-    const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
-    const vm mine = vm_andnot(vm_and(i.mask, window), cut);
-    if (!vm_any(vm_or(mine, cut))) return;
-    const kernel_unit_segment run = kernel_tet_segment(p, list, c, faces, &i);
-    if (__builtin_expect(vm_any(cut), 0)) {
-        i.mask = cut;
-        kernel_linear_segments(p, list, &i, (const vf[2]){p->t_near, list->t_cut}, &run);
-    }
-    /* segments are kept if their length is positive, not if t_in < t_out, because in double the length may be positive
-     * although both depths are the same float32 */
-    kernel_segments_add(list, vm_and(mine, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out, &run);
-}
 
 /* Adds the rays' intervals in a hex, wedge or pyramid whose field is constant as segments. The value is computed in
  * double if list->is_double is set, because narrow ramps magnify its rounding. reach: first and last depth of the

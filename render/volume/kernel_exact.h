@@ -21,7 +21,8 @@
  *
  * An edge function is affine in the ray's u and v (kernel_cell.h). So are the sum D of a face's three edge functions,
  * and the sum N of its vertices' depths, each times the opposite edge's function, and the same sum of their values:
- * nine coefficients per face, computed once per cell and tile. The ray meets the face's plane at the depth N / D.
+ * nine coefficients per face, computed once per cell and window for one tet per lane; each ray gathers those of the two
+ * faces that it crosses. The ray meets the face's plane at the depth N / D.
  * Because the decision that the ray crosses the face is made in float32, that point may lie outside the face: an edge
  * function there may be negative by about 1e-7 of its terms' magnitudes. If D is less than KERNEL_DOUBLE_EDGE times
  * these magnitudes, the face is seen so nearly edge on that the point may be far outside the face, and the segment
@@ -36,10 +37,11 @@
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_integral.h"
+#include "kernel_lanes_cell.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_shapes.h"
-#include "kernel_tets.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "simd.h"
@@ -49,28 +51,33 @@
  * face's extent outside the face. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* A face of a tet, as affine functions c[0] + c[1] u + c[2] v of the ray. depth, value: sums over the face's vertices
- * of their depths t and values, each times the opposite edge's function; weight: sum of the three edge functions, by
- * which both must be divided. A tet has four faces, in the order of kernel_tet_face. */
-typedef struct kernel_double_face {
-    double depth[3], value[3], weight[3];
-    double least; /* the face is not seen edge on if the magnitude of the weight is larger than this */
-} kernel_double_face;
+/* Numbers of a face of a tet: the coefficients c, cu and cv of three affine functions c + cu u + cv v of the ray, and
+ * KERNEL_DOUBLE_LEAST. The functions KERNEL_DOUBLE_DEPTH and KERNEL_DOUBLE_VALUE are sums over the face's vertices of
+ * their depths t and values, each times the opposite edge's function; KERNEL_DOUBLE_WEIGHT is the sum of the three edge
+ * functions, by which both must be divided. The face is not seen edge on if the magnitude of this sum is larger than
+ * KERNEL_DOUBLE_LEAST. */
+enum {
+    KERNEL_DOUBLE_DEPTH = 0,
+    KERNEL_DOUBLE_VALUE = 3,
+    KERNEL_DOUBLE_WEIGHT = 6,
+    KERNEL_DOUBLE_LEAST = 9,
+    KERNEL_DOUBLE_NUMBERS
+};
 
-/* Computes the (u, v) of a packet's rays in double, relative to the tile's centre, in two halves of the lanes. */
-SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
+/* The faces of one tet per lane, in the order of kernel_tet_face: by face and number, in two halves of the lanes. */
+typedef struct kernel_double_faces {
+    kernel_f64 of[4][KERNEL_DOUBLE_NUMBERS][2];
+} kernel_double_faces;
+
+/* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
+SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, double u[SIMD_WIDTH], double v[SIMD_WIDTH])
 {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_ray_parameters(p, u, v);
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        px[i] -= p->tile->centre_x;
-        py[i] -= p->tile->centre_y;
+        u[i] -= p->tile->centre_x;
+        v[i] -= p->tile->centre_y;
     }
-    memcpy(u, px, sizeof px);
-    memcpy(v, py, sizeof py);
 }
-
-/* ---- a cell ---- */
 
 /* A vertex in tile space in double. On the ray (u, v) it is projected to (x - u * depth, y - v * depth). t: z in tile
  * space; value: the field in the transfer function's domain. */
@@ -98,116 +105,132 @@ static inline double kernel_double_domain(const kernel_transfer *transfer, doubl
     return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
 }
 
+/* ---- tets, one per lane ---- */
+
+/* A vertex of each tet in tile space, for one half of the lanes. On the ray (u, v) it is projected to (x - u * depth,
+ * y - v * depth). at: x, y and t; value: the field in the transfer function's domain. */
+typedef struct kernel_double_vertices {
+    kernel_f64 at[3], depth, value;
+} kernel_double_vertices;
+
 /* Computes the three coefficients of the edge function from a to b (kernel_cell.h). */
-SIMD_INLINE void kernel_double_edge(const kernel_double_vertex *a, const kernel_double_vertex *b, double edge[3])
+SIMD_INLINE void kernel_double_edge(const kernel_double_vertices *a, const kernel_double_vertices *b,
+                                    kernel_f64 edge[3])
 {
-    edge[0] = a->x * b->y - b->x * a->y;
-    edge[1] = b->depth * a->y - a->depth * b->y;
-    edge[2] = a->depth * b->x - b->depth * a->x;
+    edge[0] = a->at[0] * b->at[1] - b->at[0] * a->at[1];
+    edge[1] = b->depth * a->at[1] - a->depth * b->at[1];
+    edge[2] = a->depth * b->at[0] - b->depth * a->at[0];
 }
 
-/* Computes the affine functions of one face from the tet's vertices (spots) and edge functions. face: a row of
- * kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
-SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertex *spots, double (*const edges)[3],
-                                            const signed char *face, double radius, kernel_double_face *out)
+/* Computes the numbers of one face, for one half of the lanes, from the tets' vertices and edge functions. face: a row
+ * of kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
+SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots, const kernel_f64 (*edges)[3],
+                                            const signed char *face, double radius, int half,
+                                            kernel_f64 out[KERNEL_DOUBLE_NUMBERS][2])
 {
-    const kernel_double_vertex *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
-    const double *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
-    out->least = 0;
+    const kernel_double_vertices *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const kernel_f64 *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
+    kernel_f64 least = {0};
     for (int n = 0; n < 3; n++) {
-        out->depth[n] = (jk[n] * i->t - ik[n] * j->t) + ij[n] * k->t;
-        out->value[n] = (jk[n] * i->value - ik[n] * j->value) + ij[n] * k->value;
-        out->weight[n] = (jk[n] - ik[n]) + ij[n];
-        out->least += KERNEL_DOUBLE_EDGE * (n ? radius : 1) * ((fabs(ij[n]) + fabs(jk[n])) + fabs(ik[n]));
+        out[KERNEL_DOUBLE_DEPTH + n][half] = (jk[n] * i->at[2] - ik[n] * j->at[2]) + ij[n] * k->at[2];
+        out[KERNEL_DOUBLE_VALUE + n][half] = (jk[n] * i->value - ik[n] * j->value) + ij[n] * k->value;
+        out[KERNEL_DOUBLE_WEIGHT + n][half] = (jk[n] - ik[n]) + ij[n];
+        least += KERNEL_DOUBLE_EDGE * (n ? radius : 1) *
+                 ((kernel_f64_abs(ij[n]) + kernel_f64_abs(jk[n])) + kernel_f64_abs(ik[n]));
     }
+    out[KERNEL_DOUBLE_LEAST][half] = least;
 }
 
-/* Computes the affine functions of a tet's four faces. The tet's vertices must have been sorted by coordinates. */
+/* Computes the faces of the transformed tets. */
 static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_frame *f, const kernel_tile *tile,
-                                                                  const kernel_cell *c, const kernel_transfer *transfer,
-                                                                  kernel_double_face faces[4])
+                                                                  const kernel_transformed_tets *tets,
+                                                                  const kernel_transfer *transfer,
+                                                                  kernel_double_faces *out)
 {
-    kernel_double_vertex spots[4];
-    double edges[KERNEL_TET_EDGES][3];
-    for (int i = 0; i < 4; i++) {
-        spots[i] = kernel_double_transform(f, tile, c->world[i]);
-        spots[i].value = kernel_double_domain(transfer, c->values[i]);
+    for (int half = 0; half < 2; half++) {
+        kernel_double_vertices spots[4];
+        kernel_f64 edges[KERNEL_TET_EDGES][3];
+        for (int i = 0; i < 4; i++) {
+            const kernel_f64 value = (tets->values[i][half] - transfer->low) * transfer->inverse_width;
+            spots[i].depth = kernel_lanes_transform_half(f, tile, tets->world[i], half, spots[i].at);
+            spots[i].value = kernel_f64_clamp(value, 1e18);
+        }
+        for (int n = 0; n < KERNEL_TET_EDGES; n++)
+            kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
+        for (int n = 0; n < 4; n++)
+            kernel_double_compute_face(spots, (const kernel_f64(*)[3])edges, kernel_tet_face[n], (double)tile->radius,
+                                       half, out->of[n]);
     }
-    for (int n = 0; n < KERNEL_TET_EDGES; n++)
-        kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
-    for (int n = 0; n < 4; n++)
-        kernel_double_compute_face(spots, edges, kernel_tet_face[n], (double)tile->radius, &faces[n]);
 }
 
-/* ---- rays in a tet ---- */
+/* ---- rays with a tet each ---- */
 
-/* Returns the affine function with the coefficients c on the rays (u, v). */
-SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_f64 v)
+/* A ray's point in the plane of a face: depth t and value, in two halves of the lanes. sound: rays that do not see the
+ * face edge on. */
+typedef struct kernel_double_points {
+    kernel_f64 t[2], value[2];
+    vm sound;
+} kernel_double_points;
+
+/* Returns one of the affine functions of each ray's face on the ray (u, v), for one half of the lanes. function:
+ * KERNEL_DOUBLE_DEPTH, KERNEL_DOUBLE_VALUE or KERNEL_DOUBLE_WEIGHT; index: of the face's first number in `faces`, in
+ * floats. */
+SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_faces *faces, int function, vi index, int half,
+                                            kernel_f64 u, kernel_f64 v)
 {
+    kernel_f64 c[3];
+    for (int n = 0; n < 3; n++) c[n] = vd_gather((const float *)(const void *)faces->of[0][function + n], index, half);
     return (c[0] + c[1] * u) + c[2] * v;
 }
 
-/* Rounds doubles to float32, and stores them in one half of the lanes of *v, and the rounding errors in the same half
- * of *rest. */
-SIMD_INLINE void kernel_store_rounded_doubles(kernel_f64 value, int half, vf *v, vf *rest)
+/* Computes the points of rays in the planes of the faces with the given numbers. lane: lane of each ray's tet. */
+SIMD_INLINE void kernel_double_compute_points(const kernel_double_faces *faces, vi face, vi lane, const kernel_f64 u[2],
+                                              const kernel_f64 v[2], kernel_double_points *out)
 {
-    kernel_f64_store_half_of_vector(v, half, value);
-    kernel_f64_store_half_of_vector(rest, half, value - kernel_f64_widen_half(v, half));
-}
-
-/* Computes a tet's segment in double on the rays (u, v), and stores it in one half of the lanes of *out; the length is
- * in units of t. hit: for each face, the rays that cross it, decided in float32. Returns the rays for which the segment
- * is valid: those that cross two faces, none of which is seen edge on. */
-SIMD_INLINE kernel_f64_mask kernel_double_segment_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
-                                                       const vm hit[4], int half, kernel_unit_segment *out)
-{
-    kernel_f64 t[2] = {{0}, {0}}, value[2] = {{0}, {0}};
-    kernel_f64_mask met[2] = {{0}, {0}}, sound = ~(kernel_f64_mask){0};
-    for (int n = 0; n < 4; n++) {
-        const kernel_double_face *face = &faces[n];
-        const kernel_f64_mask hits = kernel_f64_mask_of_half(hit[n], half);
-        const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
-        const kernel_f64 depth = kernel_affine_at(face->depth, u, v) * inverse;
-        const kernel_f64 own = kernel_affine_at(face->value, u, v) * inverse;
-        /* the point is not valid if the face is seen edge on */
-        sound &= ~hits | (kernel_f64_mask)(weight * weight > face->least * face->least);
-        for (int end = 1; end >= 0; end--) {
-            const kernel_f64_mask m = end ? hits & met[0] : hits & ~met[0];
-            t[end] = kernel_f64_select(m, depth, t[end]);
-            value[end] = kernel_f64_select(m, own, value[end]);
-            met[end] |= m;
-        }
-    }
-    const kernel_f64_mask swap = (kernel_f64_mask)(t[1] < t[0]);
-    kernel_f64_store_half_of_vector(&out->length, half,
-                                    kernel_f64_select(swap, t[0], t[1]) - kernel_f64_select(swap, t[1], t[0]));
-    kernel_store_rounded_doubles(kernel_f64_select(swap, value[1], value[0]), half, &out->v_in, &out->rest_in);
-    kernel_store_rounded_doubles(kernel_f64_select(swap, value[0], value[1]), half, &out->v_out, &out->rest_out);
-    return sound & met[0] & met[1];
-}
-
-/* Replaces the length and the values of *run, a tet's segment in float32, by those computed in double, on the given
- * rays for which these are valid. The length is in units of t. */
-static __attribute__((noinline)) void kernel_tet_segment_in_double(const kernel_packet *p, const kernel_cell *c,
-                                                                   const kernel_double_face faces[4],
-                                                                   const kernel_f64 u[2], const kernel_f64 v[2],
-                                                                   vm active, kernel_unit_segment *run)
-{
-    kernel_unit_segment exact = *run;
-    vf sound = vf_set(0);
-    vm hit[4];
-    kernel_tet_faces(p, c, active, hit);
+    const vi index = face * (2 * SIMD_WIDTH * KERNEL_DOUBLE_NUMBERS) + 2 * lane;
+    kernel_f64 weight[2], least[2];
     for (int half = 0; half < 2; half++) {
-        const kernel_f64_mask is_sound = kernel_double_segment_half(faces, u[half], v[half], hit, half, &exact);
-        kernel_f64_store_half_of_vector(&sound, half,
-                                        kernel_f64_select(is_sound, (kernel_f64){0} + 1, (kernel_f64){0}));
+        const kernel_f64 w = kernel_double_affine(faces, KERNEL_DOUBLE_WEIGHT, index, half, u[half], v[half]);
+        const kernel_f64 inverse = 1.0 / w;
+        out->t[half] = kernel_double_affine(faces, KERNEL_DOUBLE_DEPTH, index, half, u[half], v[half]) * inverse;
+        out->value[half] = kernel_double_affine(faces, KERNEL_DOUBLE_VALUE, index, half, u[half], v[half]) * inverse;
+        weight[half] = w * w;
+        least[half] = vd_gather((const float *)(const void *)faces->of[0][KERNEL_DOUBLE_LEAST], index, half);
+        least[half] *= least[half];
     }
-    const vm better = vm_and(active, vf_lt(vf_set(0), sound));
-    run->length = vf_select(better, exact.length, run->length);
-    run->v_in = vf_select(better, exact.v_in, run->v_in);
-    run->v_out = vf_select(better, exact.v_out, run->v_out);
-    run->rest_in = vf_select(better, exact.rest_in, run->rest_in);
-    run->rest_out = vf_select(better, exact.rest_out, run->rest_out);
+    out->sound = vd_lt(least, weight);
+}
+
+/* Rounds doubles to float32 (*v), and computes the rounding errors (*rest). */
+SIMD_INLINE void kernel_round_doubles(const kernel_f64 value[2], vf *v, vf *rest)
+{
+    kernel_f64 lost[2];
+    *v = kernel_halves_narrow(value);
+    for (int half = 0; half < 2; half++) lost[half] = value[half] - kernel_f64_widen_half(v, half);
+    *rest = kernel_halves_narrow(lost);
+}
+
+/* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double, on
+ * the rays that see none of the two crossed faces edge on. The length is in units of t. lane: lane of each ray's tet;
+ * first, second: numbers of the crossed faces; u, v: of the rays. */
+SIMD_INLINE void kernel_double_segments(const kernel_double_faces *faces, vi lane, vi first, vi second,
+                                        const kernel_f64 u[2], const kernel_f64 v[2], kernel_unit_segment *run)
+{
+    kernel_double_points a, b;
+    kernel_f64 ends[2][2], length[2];
+    vf rounded[2], rest[2];
+    kernel_double_compute_points(faces, first, lane, u, v, &a);
+    kernel_double_compute_points(faces, second, lane, u, v, &b);
+    const vm sound = vm_and(a.sound, b.sound), swap = vd_lt(b.t, a.t);
+    vd_select(swap, b.value, a.value, ends[0]);
+    vd_select(swap, a.value, b.value, ends[1]);
+    for (int half = 0; half < 2; half++) length[half] = kernel_f64_abs(b.t[half] - a.t[half]);
+    for (int end = 0; end < 2; end++) kernel_round_doubles(ends[end], &rounded[end], &rest[end]);
+    run->length = vf_select(sound, kernel_halves_narrow(length), run->length);
+    run->v_in = vf_select(sound, rounded[0], run->v_in);
+    run->v_out = vf_select(sound, rounded[1], run->v_out);
+    run->rest_in = vf_select(sound, rest[0], run->rest_in);
+    run->rest_out = vf_select(sound, rest[1], run->rest_out);
 }
 
 enum { KERNEL_EXACT_STEPS = 24 };

@@ -44,7 +44,19 @@ typedef struct kernel_local_queue {
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
-enum { KERNEL_SORT_ENDS = 48, KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
+enum { KERNEL_SORT_ENDS = 48 };
+
+/* The pairs of a ray and a tet, of the vector of tets that is being processed, which may meet, in vectors of SIMD_WIDTH
+ * pairs (kernel_tet_pairs_next()). First come the pairs of small tets, which kernel_tile_cells.rays lists one after the
+ * other. Then each larger tet is paired with the rays of one packet after the other. */
+typedef struct kernel_tet_pairs {
+    int next;                    /* index of the first listed pair that is left */
+    unsigned large;              /* mask of the lanes of larger tets that are left */
+    uint16_t blocks[SIMD_WIDTH]; /* for each larger tet, the blocks in which it may be visible */
+    int lane;                    /* lane of the current larger tet */
+    unsigned left;               /* those of its blocks that are left */
+    int packet;                  /* packet of the current vector's rays; -1 if its pairs are listed */
+} kernel_tet_pairs;
 
 /* The cells of a volume in the tile: candidates, queued cells of a mesh part, and the cells that are being processed.
  */
@@ -58,7 +70,6 @@ typedef struct kernel_tile_cells {
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
     const struct kernel_volume_method *method; /* samples or segments */
-    bool has_tet_lanes;                        /* set if small tets are processed in lanes */
     bool has_curved_lanes;                     /* set if hexes, wedges and pyramids are processed in lanes */
     int volume, part;     /* volume and mesh part of the queued cells; part: -1 if there is none yet */
     kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
@@ -66,6 +77,7 @@ typedef struct kernel_tile_cells {
     kernel_cell cell;                  /* the cell that packets are tracing */
     kernel_map map;                    /* inverse map of that cell */
     kernel_transformed_tets tets;      /* the vector of tets that is being processed */
+    kernel_tet_pairs tet_pairs;        /* its tets, paired with rays */
     const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */
     /* the current vector of hexes, wedges or pyramids in tile space; affine edge functions are not set */
     kernel_transformed_curved curved;
@@ -75,10 +87,6 @@ typedef struct kernel_tile_cells {
     int32_t pixel_ends[4][SIMD_WIDTH];
     int alone;              /* the lane whose cell is also stored in `cell` (kernel_tile_make_current()); -1: none */
     kernel_pixel_list rays; /* pairs of a pixel, in a cell's box, and the lane of that cell */
-    /* block_u, block_v: the (u, v) of the ray through the middle of each block; half_u, half_v: half of the extent of
-     * (u, v) over a block's rays */
-    vf block_u[KERNEL_BLOCK_VECTORS], block_v[KERNEL_BLOCK_VECTORS];
-    float half_u, half_v;
 } kernel_tile_cells;
 
 /* Begins a volume with empty queues. */

@@ -106,6 +106,22 @@ SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, v
     return taken;
 }
 
+/* Stores, for the samples in the given lanes, the ends of their rays' intervals in their cells (kernel_samples).
+ * places, numbers: as above. */
+static __attribute__((noinline, cold)) void kernel_local_store_contact(kernel_tile_volume *v, unsigned lanes, vi places,
+                                                                       vi numbers, vf t_in, vf t_out)
+{
+    int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    memcpy(number, &numbers, sizeof number);
+    for (; lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes);
+        kernel_samples *s = &v->packets[at[i] / SIMD_WIDTH];
+        s->t_in[number[i]][at[i] % SIMD_WIDTH] = t_in[i];
+        s->t_out[number[i]][at[i] % SIMD_WIDTH] = t_out[i];
+    }
+}
+
 /* Decides, by the ray's crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and
  * sets its value if it does. lane: the lane of the cell; at: position of the ray among the tile's packets; number: that
  * of the sample in the window. */

@@ -42,19 +42,23 @@ enum { KERNEL_LOCAL_MET, KERNEL_LOCAL_CROSSED, KERNEL_LOCAL_CROSSED_TRIANGLE, KE
 /* The segments of a tile's rays in a window, and the state of the vector of cells that is being processed. */
 typedef struct kernel_tile_segments {
     kernel_segments packets[KERNEL_TILE_PACKETS];
-    kernel_double_face precise[4]; /* faces of the current tet in double; set only if frame->is_double is set */
-    float depth;                   /* length of the next window in depth; 0 if it has not been determined yet */
-    unsigned blocks;               /* blocks of the current window */
+    float depth;     /* length of the next window in depth; 0 if it has not been determined yet */
+    unsigned blocks; /* blocks of the current window */
     int volume;
     float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances of the transfer function per unit of t, by packet and lane */
     kernel_local_bounds bounds;       /* error bounds of the current vector of cells */
     bool is_double;                   /* set if the ends of segments are stored in double */
     bool has_cuts;                    /* set if transparent surfaces cut segments */
+    bool has_overflowed;              /* set if a ray has more such cuts than kernel_hits stores */
     int list_count[KERNEL_LOCAL_LISTS];
     float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* one word per ray */
     /* For each ray, by packet and lane, depths side by side: begin and end of the ray's window (window), and begin and
      * end of the part of the ray in which segments lie (reach). */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
+    /* The following members are set only if is_double is: (u, v) of each ray in double, by packet and lane, relative to
+     * the tile's centre; and the faces of the current vector of tets. */
+    double u[KERNEL_LOCAL_PIXELS], v[KERNEL_LOCAL_PIXELS];
+    kernel_double_faces faces;
 } kernel_tile_segments;
 
 /* Adds one segment per lane, in the lanes `rays`, to the list of the lane's ray. places: position of each ray among the
@@ -254,20 +258,39 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
     }
 }
 
-/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
- * none. places: position of each ray among the tile's packets. */
-static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
-                                                          vi places, vm rays, vf from)
+/* Does the same as kernel_local_next_cut(), if rays may have more cuts than kernel_hits stores. */
+static __attribute__((noinline, cold)) vf
+kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
 {
     int32_t at[SIMD_WIDTH];
     float next[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
     vf_store(next, vf_set(INFINITY));
-    for (unsigned bits = b->has_cuts ? vm_bits(rays) : 0; bits; bits &= bits - 1) {
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), packet = at[i] / SIMD_WIDTH;
         next[i] = kernel_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
     }
     return vf_load(next);
+}
+
+/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
+ * none. places: position of each ray among the tile's packets. */
+static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
+                                                          vi places, vm rays, vf from)
+{
+    enum { HITS = sizeof(kernel_hits) / sizeof(float) };
+    vf next = vf_set(INFINITY);
+    if (!b->has_cuts) return next;
+    if (b->has_overflowed) return kernel_local_next_cut_singly(t, b, places, rays, from);
+    const vi hits = places / SIMD_WIDTH * HITS, at = hits + (places & (SIMD_WIDTH - 1));
+    const vf bits = vf_gather((const float *)(const void *)&t->hits[0].cut_count, hits);
+    const vf count = vf_select(rays, vf_from_vi(vi_from_bits(bits)), vf_set(0));
+    for (int n = 0; vm_any(vf_lt(vf_set((float)n), count)); n++) {
+        const vf cut = vf_gather((const float *)(const void *)&t->hits[0].cut[n], at);
+        const vm behind = vm_and(vf_lt(vf_set((float)n), count), vf_lt(from, cut));
+        next = vf_select(behind, vf_min(cut, next), next);
+    }
+    return next;
 }
 
 /* Adds the segments of rays whose intervals are cut by surfaces, between the depths reach[0] and reach[1]. */

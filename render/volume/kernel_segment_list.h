@@ -10,7 +10,6 @@
 #include "fragment.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
-#include "kernel_exact.h"
 #include "kernel_hits.h"
 #include "kernel_integral.h"
 #include "kernel_map.h"
@@ -33,7 +32,6 @@ typedef struct kernel_segments {
     bool is_double;
     float precise[SIMD_WIDTH][KERNEL_WINDOW][4];
     int capacity; /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
-    kernel_f64 u[2], v[2]; /* (u, v) of the rays in double, relative to the tile's centre; set if is_double is */
     /* Light of the segments that do not fit into a ray's list because more than its capacity begin at the same depth,
      * as in meshes that overlap many times. Such segments have no order. They are integrated at once, and this sum is
      * blended behind the window's other segments. */
@@ -105,14 +103,6 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *li
 }
 
 /* ---- a ray's segments ---- */
-
-/* Sets whether the ends of segments are stored in double, and what depends on it. */
-SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segments *list, bool is_double)
-{
-    list->is_double = is_double;
-    list->capacity = is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
-    if (is_double) kernel_double_rays_of(p, list->u, list->v);
-}
 
 /* Sorts the full list of the ray in `lane` by t_in. */
 static void kernel_items_sort(kernel_segments *list, int lane)

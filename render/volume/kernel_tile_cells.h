@@ -1,9 +1,9 @@
 /* Processes the cells of a volume in a whole tile and one window, an interval of depths. kernel_local_queue.h defines
  * the terms. Cells are queued by type; SIMD_WIDTH cells of a type are transformed at once and passed to the functions
- * that compute samples or segments (kernel_volume_method). Other cells are transformed one by one and passed to the
- * packets of the blocks that they may meet. If the trees have been traversed in advance for the whole picture
- * (kernel_candidates.h), the tile's cells are known: they are sorted by depth, and a window processes those that
- * overlap it. Otherwise the tile traverses the trees once per window.
+ * that compute samples or segments (kernel_volume_method). Other cells are transformed one by one and, unless they are
+ * tets, passed to the packets of the blocks that they may meet. If the trees have been traversed in advance for the
+ * whole picture (kernel_candidates.h), the tile's cells are known: they are sorted by depth, and a window processes
+ * those that overlap it. Otherwise the tile traverses the trees once per window.
  *
  *     cells, by where they begin   |--a--|  |---b---|    |-c-|
  *                                     |--d--|   |--e--|
@@ -44,9 +44,8 @@ typedef struct kernel_volume_method {
     /* Processes a cell, which is in tile space, with the rays of the packets of the given blocks. map: its inverse map;
      * NULL if it needs none. */
     kernel_tile_trace_cell *take;
-    /* Processes those of the transformed tets in the given lanes that are small, one ray-tet pair per lane, which is
-     * faster. Returns the lanes of the other tets. */
-    unsigned (*process_tets)(kernel_tile_trace *t, unsigned lanes);
+    /* Processes the current vector of tets, paired with rays by kernel_tet_pairs_next(). */
+    void (*process_tets)(kernel_tile_trace *t);
     /* Transforms the current vector of cells of this type: hexes, wedges or pyramids. Returns a mask of the visible
      * ones. *lanes: mask of those that can be processed in lanes. */
     unsigned (*transform)(kernel_tile_trace *t, int type, unsigned *lanes);
@@ -56,119 +55,12 @@ typedef struct kernel_volume_method {
     void (*finish)(kernel_tile_trace *t, int type);
 } kernel_volume_method;
 
-/* ---- the blocks that a tet's outline meets ----
- *
- * Finds which of a tile's blocks the outline of a tet in the picture meets, one block per lane. The outline's bounding
- * box (kernel_points_placement()) also covers blocks beside slanted edges. If it were the only test, two of five
- * packets would be traced although no ray meets the tet.
- *
- * An edge function is an affine function of the ray's (u, v) (kernel_cell.h). So over a block it differs from its value
- * at the block's middle by at most its slopes times half of the extent of (u, v) in the block. A ray crosses a face if
- * the face's three edge functions, with the edges taken in cyclic order, have the same sign. If that is impossible for
- * all faces in a block, no ray of the block crosses the tet. */
-
-/* Computes the (u, v) of the blocks' middles, and half of the extent of (u, v) in a block: that of the widest block,
- * plus a thousandth for all rounding. The tile's rays must be set. */
-static inline void kernel_block_rays_setup(kernel_tile_cells *cells, const kernel_frame *f, const kernel_tile *tile)
+/* Returns the blocks that contain pixels of the box, which is packed as in kernel_tile_candidate. */
+SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
 {
-    const bool flat = f->job->camera.is_orthographic;
-    const float *u = flat ? tile->origin_x : tile->slope_x, *v = flat ? tile->origin_y : tile->slope_y;
-    float middle[2][KERNEL_BLOCKS];
-    cells->half_u = cells->half_v = 0;
-    for (int b = 0; b < KERNEL_BLOCKS; b++) {
-        const int column = b % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, row = b / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK;
-        const float *first_u = u + column, *first_v = v + row;
-        middle[0][b] = 0.5f * (first_u[0] + first_u[KERNEL_BLOCK - 1]);
-        middle[1][b] = 0.5f * (first_v[0] + first_v[KERNEL_BLOCK - 1]);
-        cells->half_u = fmaxf(cells->half_u, 0.5005f * fabsf(first_u[KERNEL_BLOCK - 1] - first_u[0]));
-        cells->half_v = fmaxf(cells->half_v, 0.5005f * fabsf(first_v[KERNEL_BLOCK - 1] - first_v[0]));
-    }
-    for (int n = 0; n < KERNEL_BLOCK_VECTORS; n++) {
-        cells->block_u[n] = vf_load(middle[0] + n * SIMD_WIDTH);
-        cells->block_v[n] = vf_load(middle[1] + n * SIMD_WIDTH);
-    }
-}
-
-/* Returns the blocks that may have a ray that crosses the tet, whose edge functions must be set. The edge function at a
- * block's middle has a rounding error of at most the same bound as on a ray. On rays on which its sign is uncertain,
- * the sign is computed from projected vertices, and is within that bound, too. So twice the bound is subtracted. If a
- * number is NaN, the block counts as met. */
-SIMD_INLINE unsigned kernel_tet_blocks(const kernel_tile_cells *cells, const kernel_cell *c)
-{
-    unsigned blocks = 0;
-    for (int i = 0; i < KERNEL_BLOCK_VECTORS; i++) {
-        vm above[KERNEL_TET_EDGES], below[KERNEL_TET_EDGES], met = vm_none();
-        for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-            const kernel_line *l = &c->lines[n];
-            const float reach = fabsf(l->cu) * cells->half_u + fabsf(l->cv) * cells->half_v + 2 * l->bound;
-            const vf e =
-                vf_muladd(vf_set(l->cv), cells->block_v[i], vf_muladd(vf_set(l->cu), cells->block_u[i], vf_set(l->c)));
-            above[n] = vm_not(vf_lt(e, vf_set(-reach)));
-            below[n] = vm_not(vf_lt(vf_set(reach), e));
-        }
-        for (int n = 0; n < 4; n++) { /* a ray that lies on the same side of all three edges of a face crosses it */
-            const signed char *edge = kernel_tet_face[n] + 3;
-            met = vm_or(met, vm_and(vm_and(above[edge[0]], above[edge[1]]), below[edge[2]]));
-            met = vm_or(met, vm_and(vm_and(below[edge[0]], below[edge[1]]), above[edge[2]]));
-        }
-        blocks |= vm_bits(met) << i * SIMD_WIDTH;
-    }
-    return blocks;
-}
-
-/* ---- cells ---- */
-
-/* Transforms the cell that has been read into `cell`, and prepares it for the rays of the given blocks. Returns those
- * of the blocks in which it may be visible. */
-static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                                     const grid *g, unsigned blocks)
-{
-    const kernel_transfer *transfer = &t->frame->volumes[cells->volume];
-    kernel_cell *c = &cells->cell;
-    const float *const places[3] = {c->x, c->y, c->z};
-    if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
-    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
-    const unsigned meets = kernel_tile_visible_blocks(t, places, c->count, blocks);
-    if (!meets) return 0;
-    kernel_cell_order(c);
-    kernel_cell_map_values_to_domain(c, transfer);
-    if (cells->method->is_pencil || kernel_is_linear(c->type)) kernel_cell_compute_lines(c, t->frame, &t->tile);
-    if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(cells, c);
-    if (!c->is_constant) kernel_map_setup(&cells->map, c);
-    return meets;
-}
-
-/* Makes the cell in the given lane of the current vector the tile's current cell (`cell`), to be processed by packets,
- * for rays of any block. Does nothing if it already is the current cell. Returns false if it is invisible. */
-static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
-{
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    const grid *g = cells->arrays.cells;
-    if (cells->alone == lane) return true;
-    cells->alone = -1;
-    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[cells->volume].field.fields[cells->part],
-                      cells->current->cell[lane]);
-    if (!kernel_tile_transform_cell(t, cells, g, KERNEL_ALL_BLOCKS)) return false;
-    cells->alone = lane;
-    return true;
-}
-
-/* Reads a cell, transforms it, and processes it by the packets of the given blocks. */
-static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace *t, int part, uint32_t index,
-                                                               unsigned blocks)
-{
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_trace_cell *take = cells->method->take;
-    kernel_cell *c = &cells->cell;
-    const grid *g = t->frame->job->parts[part].cells;
-    t->thread->volume_cells++;
-    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
-    if (kernel_has_own_faces(c->type)) {
-        take(t, part, c, NULL, blocks);
-        return;
-    }
-    blocks = kernel_tile_transform_cell(t, cells, g, blocks);
-    if (blocks) take(t, part, c, kernel_is_linear(c->type) || c->is_constant ? NULL : &cells->map, blocks);
+    const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
+    const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12 & 15) / KERNEL_BLOCK;
+    return kernel_blocks_at((2u << x1) - (1u << x0), (2u << y1) - (1u << y0));
 }
 
 /* Returns the bounding box of the blocks' pixels, packed as in kernel_tile_candidate.box. */
@@ -224,6 +116,17 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
+/* Reads the values of tets whose field is constant per cell. */
+static __attribute__((noinline, cold)) void kernel_transformed_set_cell_values(kernel_transformed_tets *transformed,
+                                                                               const kernel_arrays *arrays,
+                                                                               const uint32_t cells[SIMD_WIDTH])
+{
+    vi cell;
+    memcpy(&cell, cells, sizeof cell);
+    kernel_numbers_gather(&arrays->values, cell, transformed->values[0]);
+    for (int i = 1; i < 4; i++) memcpy(transformed->values[i], transformed->values[0], sizeof transformed->values[i]);
+}
+
 /* Transforms the first `count` tets of the queue. Reduces their masks of blocks to those with a ray that has no nearer
  * end, and returns the lanes of the visible tets for which a block is left. */
 SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
@@ -237,7 +140,9 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     t->thread->volume_cells += count;
     kernel_local_read_indices(arrays, q, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
-    kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count);
+    for (int n = count; n < SIMD_WIDTH; n++) q->cell[n] = q->cell[0];
+    kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count, cells->method->is_pencil);
+    if (arrays->is_by_cell) kernel_transformed_set_cell_values(&cells->tets, arrays, q->cell);
     kernel_transformed_set_domain(&cells->tets, transfer);
     unsigned candidates =
         kernel_transformed_tets_visible(t, &cells->tets, &transfer->visible_values, near) & ((1u << count) - 1);
@@ -250,50 +155,144 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     return lanes;
 }
 
-/* Maximum number of pixels in the box of a tet that is processed in lanes. */
-enum { KERNEL_TET_PIXELS = 48 };
+/* Maximum number of pixels in the box of a small tet, whose pixels are listed, because it would leave most lanes of a
+ * packet idle. In larger tets, packets fill as many lanes, and store samples by whole vectors. */
+enum { KERNEL_TET_PIXELS = 32 };
 
 _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");
 
-/* Lists the pixels in the boxes of those tets in the given lanes whose boxes have at most `most` pixels, to be
- * processed with one ray-tet pair per lane: most of a packet's rays would miss such a tet. Skips tets that lie between
- * the pixels' centres. Returns the lanes of the larger tets. */
-static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned lanes, int most)
+/* Pairs the transformed tets in the given lanes with rays. blocks, boxes: the blocks and the box of pixels in which
+ * each tet may be visible, by lane. Skips tets that lie between the pixels' centres. */
+static void kernel_tet_pairs_begin(const kernel_tile_trace *t, unsigned lanes, const uint16_t *blocks,
+                                   const uint16_t *boxes)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tet_pairs *pairs = &cells->tet_pairs;
     vf places[3][8];
-    unsigned others = 0;
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 4; i++) places[a][i] = cells->tets.at[a][i];
     kernel_local_pixels(t, 4, (const vf(*)[8])places, cells->pixel_ends);
     cells->rays.count = 0;
+    pairs->next = 0;
+    pairs->large = pairs->left = 0;
+    pairs->packet = -1;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        unsigned box = cells->queues[KERNEL_CURVED_TYPES].box[n];
+        unsigned box = boxes[n];
         if (!kernel_local_clip_box(cells->pixel_ends, n, &box)) continue;
-        if (kernel_box_pixels(box) > most)
-            others |= 1u << n;
-        else
+        if (kernel_box_pixels(box) <= KERNEL_TET_PIXELS) {
             kernel_pixel_list_add_box(&cells->rays, box, n);
+            continue;
+        }
+        pairs->large |= 1u << n;
+        pairs->blocks[n] = (uint16_t)(blocks[n] & kernel_box_blocks(box));
     }
     kernel_pixel_list_pad(&cells->rays);
-    return others;
 }
 
-/* Processes the queue's first SIMD_WIDTH tets: small ones in lanes, the others by packets. */
+/* Sets *out to the rays of the next vector of pairs. Returns false if there is none. */
+SIMD_INLINE bool kernel_tet_pairs_next(const kernel_tile_trace *t, kernel_lane_rays *out)
+{
+    const kernel_pixel_list *listed = &t->thread->tile_cells->rays;
+    kernel_tet_pairs *pairs = &t->thread->tile_cells->tet_pairs;
+    if (pairs->next < listed->count) {
+        kernel_lane_rays_begin(out, t, listed, pairs->next);
+        pairs->next += SIMD_WIDTH;
+        return true;
+    }
+    if (++pairs->packet % KERNEL_BLOCK_PACKETS == 0) {
+        while (!pairs->left) {
+            if (!pairs->large) return false;
+            pairs->lane = __builtin_ctz(pairs->large);
+            pairs->left = pairs->blocks[pairs->lane];
+            pairs->large &= pairs->large - 1;
+        }
+        pairs->packet = __builtin_ctz(pairs->left) * KERNEL_BLOCK_PACKETS;
+        pairs->left &= pairs->left - 1;
+    }
+    kernel_lane_rays_of_packet(out, t, pairs->packet, pairs->lane);
+    return true;
+}
+
+/* Processes the queue's first SIMD_WIDTH tets. */
 SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
-    unsigned lanes = kernel_tile_transform_tets(t, cells, q, count);
-    if (cells->has_tet_lanes && lanes) lanes = cells->method->process_tets(t, lanes);
-    for (; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        kernel_transformed_tets_cell(&cells->tets, n, &cells->cell);
-        if (t->frame->is_double) kernel_transformed_tets_double(&cells->tets, n, &cells->cell);
-        const unsigned blocks = q->blocks[n] & kernel_tet_blocks(cells, &cells->cell);
-        cells->cell.index = q->cell[n];
-        if (blocks) cells->method->take(t, cells->part, &cells->cell, NULL, blocks);
+    const unsigned lanes = kernel_tile_transform_tets(t, cells, q, count);
+    if (!lanes) return;
+    kernel_tet_pairs_begin(t, lanes, q->blocks, q->box);
+    cells->method->process_tets(t);
+}
+
+/* Processes the tet in `cell`, which has been read and sorted but not queued, as the only one of a vector. blocks: the
+ * blocks in which it may be visible. */
+static __attribute__((noinline, cold)) void kernel_tile_process_single_tet(kernel_tile_trace *t,
+                                                                           kernel_tile_cells *cells, unsigned blocks)
+{
+    const uint16_t own_blocks = (uint16_t)blocks, box = (uint16_t)kernel_blocks_box(blocks);
+    kernel_transform_single_tet(&cells->tets, &cells->cell, t->frame, &t->tile, cells->method->is_pencil);
+    kernel_transformed_set_domain(&cells->tets, &t->frame->volumes[cells->volume]);
+    kernel_tet_pairs_begin(t, 1, &own_blocks, &box);
+    cells->method->process_tets(t);
+}
+
+/* ---- cells that are not queued ---- */
+
+/* Transforms the cell that has been read into `cell`, and prepares it for the rays of the given blocks. Returns those
+ * of the blocks in which it may be visible. */
+static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                                     const grid *g, unsigned blocks)
+{
+    const kernel_transfer *transfer = &t->frame->volumes[cells->volume];
+    kernel_cell *c = &cells->cell;
+    const float *const places[3] = {c->x, c->y, c->z};
+    if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
+    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
+    const unsigned meets = kernel_tile_visible_blocks(t, places, c->count, blocks);
+    if (!meets) return 0;
+    kernel_cell_order(c);
+    kernel_cell_map_values_to_domain(c, transfer);
+    if (kernel_is_linear(c->type)) return meets;
+    if (cells->method->is_pencil) kernel_cell_compute_lines(c, t->frame, &t->tile);
+    if (!c->is_constant) kernel_map_setup(&cells->map, c);
+    return meets;
+}
+
+/* Makes the cell in the given lane of the current vector the tile's current cell (`cell`), to be processed by packets,
+ * for rays of any block. Does nothing if it already is the current cell. Returns false if it is invisible. */
+static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    const grid *g = cells->arrays.cells;
+    if (cells->alone == lane) return true;
+    cells->alone = -1;
+    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[cells->volume].field.fields[cells->part],
+                      cells->current->cell[lane]);
+    if (!kernel_tile_transform_cell(t, cells, g, KERNEL_ALL_BLOCKS)) return false;
+    cells->alone = lane;
+    return true;
+}
+
+/* Reads a cell, transforms it, and processes it in the given blocks: by packets, unless it is a tet. */
+static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace *t, int part, uint32_t index,
+                                                               unsigned blocks)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tile_trace_cell *take = cells->method->take;
+    kernel_cell *c = &cells->cell;
+    const grid *g = t->frame->job->parts[part].cells;
+    t->thread->volume_cells++;
+    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
+    if (kernel_has_own_faces(c->type)) {
+        take(t, part, c, NULL, blocks);
+        return;
     }
+    blocks = kernel_tile_transform_cell(t, cells, g, blocks);
+    if (!blocks) return;
+    if (kernel_is_linear(c->type))
+        kernel_tile_process_single_tet(t, cells, blocks);
+    else
+        take(t, part, c, c->is_constant ? NULL : &cells->map, blocks);
 }
 
 /* ---- SIMD_WIDTH hexes, wedges or pyramids at once ---- */
@@ -347,15 +346,13 @@ SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
         while (t->thread->tile_cells->queues[i].count) kernel_tile_process_queue(t, i);
 }
 
-/* Returns whether cells of this type in the mesh part are queued for processing in vectors. Polyhedra, cells with
- * vertex indices too large for lanes, and tets with a field that is constant per cell, in which nothing is
- * interpolated, are processed one by one. */
+/* Returns whether cells of this type in the mesh part are queued for processing in vectors. Polyhedra and cells with
+ * vertex indices too large for lanes are processed one by one. */
 SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, int type)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(t->frame->job->parts[part].cells)) return false;
-    if (!kernel_is_linear(type)) return cells->has_curved_lanes;
-    return !t->frame->job->volumes[cells->volume].field.fields[part].is_cell_centred;
+    return kernel_is_linear(type) || cells->has_curved_lanes;
 }
 
 /* Adds a cell to the queue of its type; if the queue is then full, its first SIMD_WIDTH cells are processed. Returns
@@ -479,12 +476,11 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
 }
 
 /* Begins a tile, before its first window. Returns false if the tile is known to have no cells. */
-SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, const kernel_volume_method *method, bool has_tet_lanes,
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, const kernel_volume_method *method,
                                          bool has_curved_lanes)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     cells->method = method;
-    cells->has_tet_lanes = has_tet_lanes;
     cells->has_curved_lanes = has_curved_lanes;
     if (!t->frame->volume_candidates) return true;
     cells->items = t->thread->volume_bin.items;
@@ -591,7 +587,6 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
             packets[count++] = i;
         }
     }
-    if (count) kernel_block_rays_setup(t->thread->tile_cells, t->frame, &t->tile);
     return count;
 }
 

@@ -1,7 +1,8 @@
 /* Integrates volumes by segments for a whole tile, window by window, for all blocks of the tile at once.
- * kernel_segments.h defines segment and window. A cell is read and transformed once per window (kernel_tile_cells.h)
- * and passed to the packets of the blocks that it may meet. For each ray, the segments that begin in its window are
- * stored in a list, which is sorted and integrated at the end of the window.
+ * kernel_segments.h defines segment and window. Cells are read and transformed once per window (kernel_tile_cells.h),
+ * and processed with one ray-cell pair per lane, or passed to the packets of the blocks that they may meet. For each
+ * ray, the segments that begin in its window are stored in a list, which is sorted and integrated at the end of the
+ * window.
  *
  * The depth of a window is chosen so that the longest list of a ray is nearly full: as many cells as possible then lie
  * in a single window, and the lists of all of a tile's rays stay in the cache. If a ray has more segments than its list
@@ -45,16 +46,12 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
                                       unsigned blocks)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (kernel_is_linear(c->type) && t->frame->is_double)
-        kernel_double_compute_faces(t->frame, &t->tile, c, &t->frame->volumes[0], s->precise);
     for (unsigned left = blocks; left; left &= left - 1) {
         const int first = __builtin_ctz(left) * KERNEL_BLOCK_PACKETS;
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
             if (kernel_has_own_faces(c->type))
                 kernel_polyhedron_segments(p, &s->packets[i], part, c->index, p->active);
-            else if (kernel_is_linear(c->type))
-                kernel_tet_segments(p, &s->packets[i], c, s->precise, p->active);
             else
                 kernel_curved_segments(t, i, c, map, p->active, (const vf[2]){p->t_near, s->packets[i].t_cut}, 1);
         }
@@ -62,57 +59,90 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
     kernel_blocks_shorten(t, blocks);
 }
 
-/* ---- small tets ---- */
+/* ---- tets ---- */
 
-/* Adds the segments of those rays that begin or end inside their tet, by packets. places: position of each ray among
- * the tile's packets; lanes: the lane of its tet; rays: mask of lanes. */
-static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
-                                                                    vi places, vi lanes, unsigned rays)
+/* Adds the segments of rays that are cut by surfaces, or begin or end inside their tet. places: position of each ray
+ * among the tile's packets; i: the rays' intervals; whole: the intervals as segments. */
+static __attribute__((noinline)) void kernel_tet_segments_cut(const kernel_tile_trace *t, kernel_tile_segments *s,
+                                                              vi places, const kernel_interval *i, vm rays,
+                                                              const kernel_unit_segment *whole)
 {
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
+    int32_t at[SIMD_WIDTH];
+    vf near, far;
     memcpy(at, &places, sizeof at);
-    memcpy(lane, &lanes, sizeof lane);
-    for (; rays; rays &= rays - 1) {
-        const int i = __builtin_ctz(rays), packet = at[i] / SIMD_WIDTH;
-        kernel_transformed_tets_cell(&cells->tets, lane[i], &cells->cell);
-        kernel_tet_segments(&t->packets[packet], &s->packets[packet], &cells->cell, NULL,
-                            vm_from_bits(1u << at[i] % SIMD_WIDTH));
+    vf_gather_pair(s->reach, 2 * places, &near, &far);
+    const vf begin = vf_gather(s->window, 2 * places);
+    const vf last = vf_min(i->t_out, far);
+    vf from = vf_max(i->t_in, near);
+    for (vm open = vm_and(rays, vf_lt(from, last)); vm_any(open); open = vm_and(open, vf_lt(from, last))) {
+        const vf to = vf_min(last, kernel_local_next_cut(t, s, places, open, from));
+        const kernel_unit_segment part =
+            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
+        kernel_segments_add_at(s->packets, s->is_double, at, vm_and(open, vf_le(begin, from)), from, to, &part);
+        from = to;
     }
 }
 
-/* Adds the segments in those of the transformed tets in the given lanes that have few pixels, one ray-tet pair per
- * lane. Returns the lanes of the other tets. */
-static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
+/* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double.
+ * lanes: lane of each ray's tet; first, second: numbers of the two faces that it crosses. */
+static __attribute__((noinline)) void kernel_tet_segments_refine(const kernel_tile_segments *s, vi places, vi lanes,
+                                                                 vi first, vi second, kernel_unit_segment *run)
+{
+    kernel_f64 u[2], v[2];
+    for (int half = 0; half < 2; half++) {
+        u[half] = vd_gather((const float *)(const void *)s->u, 2 * places, half);
+        v[half] = vd_gather((const float *)(const void *)s->v, 2 * places, half);
+    }
+    kernel_double_segments(&s->faces, lanes, first, second, u, v, run);
+    run->length *= vf_gather(s->per_t, places);
+}
+
+/* Adds the segments of a vector of rays in their tets. */
+SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *s, kernel_lane_rays *r)
+{
+    const vi places = r->at;
+    kernel_interval i;
+    vf begin, end, near, far;
+    vm hit[4];
+    vf_gather_pair(s->window, 2 * places, &begin, &end);
+    r->active = vm_and(r->active, vf_lt(begin, end));
+    kernel_tet_rays_cross(&t->thread->tile_cells->tets, r, false, false, hit, &i);
+    if (!vm_any(i.mask)) return;
+    vf_gather_pair(s->reach, 2 * places, &near, &far);
+    const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
+    vm cut = vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out));
+    if (s->has_cuts) cut = vm_or(cut, vf_lt(kernel_local_next_cut(t, s, places, met, i.t_in), i.t_out));
+    cut = vm_and(met, cut);
+    const vm own = vm_and(vm_andnot(met, cut), vf_le(begin, i.t_in));
+    if (!vm_any(vm_or(own, cut))) return;
+    kernel_unit_segment run = kernel_unit_segment_of(i.t_out - i.t_in, i.v_in, i.v_out);
+    if (s->is_double)
+        kernel_tet_segments_refine(s, places, r->lane, kernel_tets_first_face(hit), kernel_tets_second_face(hit), &run);
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    /* segments are kept if their length is positive, not if t_in < t_out, because in double the length may be positive
+     * although both depths are the same float32 */
+    kernel_segments_add_at(s->packets, s->is_double, at, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out,
+                           &run);
+    if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, places, &i, cut, &run);
+}
+
+/* Adds the segments in the current vector of tets. */
+static __attribute__((noinline)) void kernel_tet_segments(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_PIXELS);
-    const kernel_pixel_list *rays = &t->thread->tile_cells->rays;
-    for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
-        kernel_lane_rays r;
-        kernel_interval i;
-        vf begin, end, near, far;
-        kernel_lane_rays_begin(&r, t, rays, n);
-        const vi at = r.at;
-        vf_gather_pair(s->window, 2 * at, &begin, &end);
-        r.active = vm_and(r.active, vf_lt(begin, end));
-        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, false, &i);
-        if (!vm_any(i.mask)) continue;
-        vf_gather_pair(s->reach, 2 * at, &near, &far);
-        const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
-        const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
-        const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
-        if (vm_any(own)) kernel_local_store_segments(s, at, own, i.t_in, i.t_out, i.v_in, i.v_out);
-        if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
-    }
+    kernel_lane_rays r;
+    if (s->is_double)
+        kernel_double_compute_faces(t->frame, &t->tile, &t->thread->tile_cells->tets, &t->frame->volumes[s->volume],
+                                    &s->faces);
+    while (kernel_tet_pairs_next(t, &r)) kernel_tet_segments_lanes(t, s, &r);
     kernel_blocks_shorten(t, s->blocks);
-    return others;
 }
 
 static const kernel_volume_method kernel_volume_by_segments = {
     .is_pencil = false,
     .take = kernel_tile_cell_segments,
-    .process_tets = kernel_tet_segments_small,
+    .process_tets = kernel_tet_segments,
     .transform = kernel_local_segments_transform,
     .process_pixels = kernel_local_segments_cast,
     .finish = kernel_local_segments_finish,
@@ -133,7 +163,8 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->blend = kernel_blend_begin();
     list->t_last = vf_min(p->t_far, vf_set(far));
     list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
-    kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
+    list->is_double = f->is_double && !f->job->separate_samples;
+    list->capacity = list->is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
 }
 
 /* Prepares the packet and its lists for one volume: sets the error limits and the unit distances, and begins the first
@@ -228,17 +259,18 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    /* Tets are not processed in lanes if ends of segments are computed in double, which is done per packet, nor if
-     * transparent surfaces cut segments, because packets are faster at searching for cuts. Whether tets are processed
-     * in lanes must not depend on how many cells the rank has, because the segments that are computed in lanes are not
-     * bit-identical to those that packets compute. */
-    const bool has_cuts = t->frame->has_transparent && !t->frame->job->separate_samples;
-    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, !t->frame->is_double && !has_cuts, true)) return;
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, true)) return;
     const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
-    for (int n = 0; n < count; n++)
-        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]]);
+    s->has_overflowed = false;
+    for (int n = 0; n < count; n++) {
+        const int i = packets[n];
+        kernel_ray_segments_begin(&t->packets[i], &s->packets[i], reach.far, &t->hits[i]);
+        if (s->packets[i].is_double)
+            kernel_double_rays_of(&t->packets[i], s->u + i * SIMD_WIDTH, s->v + i * SIMD_WIDTH);
+        s->has_overflowed = s->has_overflowed || vm_any(t->hits[i].overflowed);
+    }
     for (int volume = 0; volume < t->frame->volume_count; volume++)
         kernel_tile_segments_windows(t, s, packets, count, volume, &reach);
     for (int n = 0; n < count; n++) {

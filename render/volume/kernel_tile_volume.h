@@ -1,8 +1,8 @@
 /* Samples volumes for a whole tile, one window at a time, for all blocks of the tile. A window is a range of sample
  * numbers, which is the same on all of the tile's rays. Hexes, wedges and pyramids are processed one sample per lane
- * (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane (kernel_tets.h). Other cells are read and
- * transformed, and their edge functions computed, once per window (kernel_tile_cells.h). They are passed to the packets
- * of the blocks that they may meet, which set the values of the samples that lie in them. A window has at most
+ * (kernel_local_samples.h), and tets one ray-tet pair per lane (kernel_tets.h). Other cells are read and transformed,
+ * and their edge functions computed, once per window (kernel_tile_cells.h). They are passed to the packets of the
+ * blocks that they may meet, which set the values of the samples that lie in them. A window has at most
  * job->sample_group samples:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
@@ -38,14 +38,6 @@
 
 /* ---- cells ---- */
 
-/* Sets the values of a packet's samples in a tet. */
-static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_samples *s, const kernel_cell *c)
-{
-    kernel_interval i;
-    kernel_tet_interval(p, c, p->active, &i);
-    if (vm_any(i.mask)) kernel_fill_interval_samples(p, s, NULL, &i, &i);
-}
-
 /* Sets the values of a packet's samples in a hex, wedge or pyramid. map: its inverse map; NULL if the field is
  * constant. */
 static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_samples *s,
@@ -68,31 +60,27 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
             kernel_samples *s = &v->packets[i];
             if (kernel_has_own_faces(c->type))
                 kernel_polyhedron_volume(p, s, part, c->index, p->active);
-            else if (kernel_is_linear(c->type))
-                kernel_tile_tet_samples(p, s, c);
             else
                 kernel_tile_curved_samples(p, s, c, map);
         }
     }
 }
 
-/* ---- small tets: the results are bit-identical to those of kernel_samples.h ---- */
+/* ---- tets: the results are bit-identical for listed pairs and packets ---- */
 
-/* Maximum number of pixels in the box of a tet that is sampled in lanes. In larger tets, packets are as fast. */
-enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
-
-/* Emits samples that also lie in another cell as fragments of their own. lanes: mask of the lanes that hold such a
- * sample; places: position of each ray among the tile's packets; depth, value: of the samples. */
+/* Emits samples that also lie in another cell, or all samples if these are separate, as fragments of their own. lanes:
+ * mask of the lanes that hold such a sample; places: position of each ray among the tile's packets; t_in, t_out: the
+ * rays' intervals in their tets; depth, value: of the samples. */
 static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_tile_trace *t, unsigned lanes, vi places,
-                                                                        vf depth, vf value)
+                                                                        vf t_in, vf t_out, vf depth, vf value)
 {
-    const kernel_interval cell = {0};
     int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
     for (; lanes; lanes &= lanes - 1) {
-        const int i = __builtin_ctz(lanes), packet = at[i] / SIMD_WIDTH;
+        const int n = __builtin_ctz(lanes), packet = at[n] / SIMD_WIDTH;
+        const kernel_interval cell = {.t_in = vf_set(t_in[n]), .t_out = vf_set(t_out[n])};
         kernel_emit_sample(&t->packets[packet], &t->thread->tile_volume->packets[packet], &cell,
-                           vm_from_bits(1u << at[i] % SIMD_WIDTH), vf_set(depth[i]), vf_set(value[i]));
+                           vm_from_bits(1u << at[n] % SIMD_WIDTH), vf_set(depth[n]), vf_set(value[n]));
     }
 }
 
@@ -110,34 +98,38 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volum
         const vf depth = base + step * vf_from_vi(whole + b->first), value = i->v_in + slope * (depth - i->t_in);
         const vm own = vm_and(more, vm_andnot(vf_lt(depth, i->t_out), vf_lt(depth, i->t_in)));
         const unsigned taken = kernel_local_store_samples(b, own, at, whole, value);
-        if (__builtin_expect(taken, 0)) kernel_tet_samples_separate(t, taken, at, depth, value);
+        if (t->frame->needs_contact) kernel_local_store_contact(b, vm_bits(own) & ~taken, at, whole, i->t_in, i->t_out);
+        if (__builtin_expect(taken, 0)) kernel_tet_samples_separate(t, taken, at, i->t_in, i->t_out, depth, value);
         number += 1.0f;
     }
 }
 
-/* Computes the samples in those of the transformed tets in the given lanes that have few pixels, one ray-tet pair per
- * lane. Returns the lanes of the other tets. */
-static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
+/* Computes the samples in the current vector of tets. */
+static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
-    const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_SAMPLE_PIXELS);
-    const kernel_pixel_list *rays = &t->thread->tile_cells->rays;
-    for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
-        kernel_lane_rays r;
+    const kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_lane_rays r;
+    while (kernel_tet_pairs_next(t, &r)) {
+        const int packet = cells->tet_pairs.packet;
         kernel_interval i;
-        kernel_lane_rays_begin(&r, t, rays, n);
-        const vi at = r.at;
-        r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, false, &i);
-        if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
+        if (packet < 0) {
+            r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, r.at)));
+            kernel_tet_rays_interval(&cells->tets, &r, false, &i);
+            if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, r.at);
+        } else if (vm_any(r.active)) {
+            kernel_tet_rays_interval_in_one(&cells->tets, &r, cells->tet_pairs.lane, &i);
+            if (!vm_any(i.mask)) continue;
+            const kernel_interval own = i; /* not `i`, which would then be kept in memory for listed pairs, too */
+            kernel_fill_interval_samples(&t->packets[packet], &b->packets[packet], NULL, &own, &own);
+        }
     }
-    return others;
 }
 
 static const kernel_volume_method kernel_volume_by_samples = {
     .is_pencil = true,
     .take = kernel_tile_samples,
-    .process_tets = kernel_tet_samples_small,
+    .process_tets = kernel_tet_samples,
     .transform = kernel_local_transform_lanes,
     .process_pixels = kernel_local_queue_samples,
     .finish = kernel_local_fill,
@@ -230,10 +222,10 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    /* Cells are not sampled in lanes if the frame has surfaces, because these may end rays, and need the ends of
-     * intervals in cells (kernel_blend_breaks()); nor if each sample becomes a fragment of its own. */
+    /* Hexes, wedges and pyramids are not sampled in lanes if the frame has surfaces, because these may end rays, and
+     * need the ends of intervals in cells (kernel_blend_breaks()); nor if each sample becomes a fragment of its own. */
     const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
-    if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes, has_lanes)) return;
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
     /* depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees */
