@@ -9,6 +9,8 @@
 #include "kernel_polyhedron.h"
 #include "kernel_tile.h"
 #include "kernel_tets.h"
+#include "kernel_tile_trace.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_types.h"
 
 typedef struct chord_state {
@@ -43,6 +45,16 @@ static void chord_trace_polyhedron(kernel_packet *p, const chord_state *state, c
     while (kernel_poly_next(&r)) chord_store_intervals(state, r.interval.mask, r.interval.t_in, r.interval.t_out);
 }
 
+/* Computes the interval of the rays in a tet, which has been read and sorted. */
+static void chord_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
+{
+    const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays, .u = p->u, .v = p->v};
+    kernel_transformed_tets tet;
+    kernel_transform_single_tet(&tet, c, p->frame, p->tile, p->is_pencil);
+    for (int i = 0; i < 4; i++) tet.f[i] = vf_set(0);
+    kernel_tet_rays_interval_in_one(&tet, &r, 0, p->is_pencil, out);
+}
+
 static void chord_trace_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part,
                              uint32_t index, vm rays)
 {
@@ -54,11 +66,12 @@ static void chord_trace_cell(kernel_packet *p, const chord_state *state, const g
         return;
     }
     if (!c->is_transformed) {
-        kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
+        kernel_cell_transform_in_tile(c, p->frame, p->tile, p->frame->job->parts[part].cells);
+        if (p->is_pencil && c->type != GRID_TET) kernel_cell_compute_lines(c, p->frame, p->tile);
         for (int i = 0; i < c->count; i++) c->f[i] = 0;
     }
     if (c->type == GRID_TET)
-        kernel_tet_interval(p, c, rays, &list[0]);
+        chord_tet_interval(p, c, rays, &list[0]);
     else
         intervals = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < intervals; n++) chord_store_intervals(state, list[n].mask, list[n].t_in, list[n].t_out);

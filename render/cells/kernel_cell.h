@@ -168,12 +168,12 @@ typedef struct kernel_cell {
     float f[GRID_MAX_CELL_VERTICES];
     /* vertex values of the colour field, in its transfer function's domain; not set for tets */
     float g[GRID_MAX_CELL_VERTICES];
-    int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
-    kernel_line lines[KERNEL_MAX_LINES]; /* edge functions of the edges, then of the quads' diagonals */
-    float doubt;                         /* for a tet: the largest `bound` of its lines */
-    /* least sum of weights at which a crossing is accurate (kernel_least_weight()): for a tet, that of each face; for
-     * other cells, least[0] is an upper bound for all triangles */
-    float least[4];
+    int rank[GRID_MAX_CELL_VERTICES]; /* rank of each vertex in the lexicographic order of coordinates */
+    /* edge functions of the edges, then of the quads' diagonals; not computed for tets */
+    kernel_line lines[KERNEL_MAX_LINES];
+    /* upper bound, for all triangles, of the least sum of weights at which a crossing is accurate
+     * (kernel_least_weight()) */
+    float least;
 } kernel_cell;
 
 /* An interval of each ray inside a cell. _in and _out: at the crossings at which the ray enters and leaves. t: ray
@@ -423,33 +423,16 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- edge functions of a cell ---- */
 
-SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
-{
-    kernel_edge_error error_bound[KERNEL_TET_EDGES];
-    float size[4];
-    for (int i = 0; i < 4; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
-    c->doubt = 0;
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const kernel_tile_position from = kernel_cell_position(c, i), to = kernel_cell_position(c, j);
-        c->lines[n] = kernel_line_between(f, from, to, size[i], size[j]);
-        error_bound[n] = kernel_line_error(&c->lines[n], tile->radius, from, to);
-        c->doubt = c->doubt < c->lines[n].bound ? c->lines[n].bound : c->doubt;
-    }
-    for (int n = 0; n < 4; n++) {
-        const kernel_edge_error *ij = &error_bound[(int)kernel_tet_face[n][3]],
-                                *jk = &error_bound[(int)kernel_tet_face[n][4]];
-        const kernel_edge_error *ik = &error_bound[(int)kernel_tet_face[n][5]];
-        c->least[n] = kernel_least_weight((ij->error + jk->error) + ik->error, (ij->extent + jk->extent) + ik->extent);
-    }
-}
-
-SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+/* Computes the edge functions of a hex, wedge or pyramid, unless this has been done. */
+static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, const kernel_frame *f,
+                                                              const kernel_tile *tile)
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
     signed char ends[KERNEL_MAX_LINES][2];
     float size[GRID_MAX_CELL_VERTICES];
     const int count = shape->edge_count + shape->face_count;
+    if (c->has_lines) return;
+    c->has_lines = true;
     memset(ends, 0, sizeof ends);
     memcpy(ends, shape->edges, (size_t)shape->edge_count * sizeof ends[0]);
     for (int face = 0; face < shape->face_count; face++) {
@@ -470,18 +453,7 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
     }
     /* A hex has triangles only if a quad has collapsed. The bound of infinity makes kernel_weights_recompute() always
      * compute the triangle's own limit. */
-    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
-}
-
-static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, const kernel_frame *f,
-                                                              const kernel_tile *tile)
-{
-    if (c->has_lines) return;
-    c->has_lines = true;
-    if (kernel_is_linear(c->type))
-        kernel_tet_lines(c, f, tile);
-    else
-        kernel_curved_lines(c, f, tile);
+    c->least = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 
 #endif

@@ -161,12 +161,6 @@ SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, f
 /* The following functions intersect rays with hexes, wedges and pyramids. Their quadrilateral faces may be warped, so
  * that a ray may enter such a cell more than once. */
 
-SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
-{
-    kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
-    if (p->is_pencil) kernel_cell_compute_lines(c, p->frame, p->tile);
-}
-
 /* The weights of crossings of a triangle. i, j, k: indices of its vertices in the cell, in the order of coordinates;
  * ij, jk, ik: its edge functions; inverse: 1 divided by the sum of the weights. Tets use the same weights, so that
  * depth and value of a crossing are bit-identical in both cells of a face. */
@@ -294,7 +288,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]],
                                          s->edge[ijk[0]][ijk[2]]);
-    kernel_weights_recompute(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
+    kernel_weights_recompute(s->packet, c->least, hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
                              kernel_cell_position(c, w.k), &w);
     out->mask = hit;
     out->t = kernel_weighted_depth(&w, c->z);

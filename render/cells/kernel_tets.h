@@ -1,6 +1,6 @@
 /* Computes the interval of rays in tets. A ray crosses two or none of a tet's four faces (kernel_cell.h). The same
- * source is compiled for a packet of rays that share one tet, and for rays that each have a tet of their own:
- * kernel_tets.is_one and is_uniform are compile-time constants wherever these functions are inlined. */
+ * source is compiled for rays that each have a tet of their own and for rays that share one tet: kernel_tets.is_uniform
+ * is a compile-time constant wherever these functions are inlined. */
 #ifndef RENDER_KERNEL_TETS_H
 #define RENDER_KERNEL_TETS_H
 
@@ -14,31 +14,25 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* Rays and their tets. is_one: `packet` has the rays, and all share the tet `one`. Otherwise lane_rays has the rays,
- * and each has its own tet, in the lane lane_rays->lane of `transformed`. is_uniform: that is `lane` for all rays. */
+/* Rays and their tets. The tet of each ray is in the lane lane_rays->lane of `transformed`, or in `lane` for all rays
+ * if is_uniform is set. */
 typedef struct kernel_tets {
-    bool is_one;
-    const kernel_packet *packet;
-    const kernel_cell *one;
     const kernel_lane_rays *lane_rays;
     const kernel_transformed_tets *transformed;
     bool is_uniform;
     int lane;
 } kernel_tets;
 
-/* Expands to a vector with one number of each ray's tet: the member of_one of kernel_cell if is_one is set, otherwise
- * the member of_transformed of kernel_transformed_tets. */
-#define KERNEL_TET_NUMBER(t, of_one, of_transformed)                                                                   \
-    ((t)->is_one       ? vf_set((t)->one->of_one)                                                                      \
-     : (t)->is_uniform ? vf_set((t)->transformed->of_transformed[(t)->lane])                                           \
-                       : vf_permute((t)->transformed->of_transformed, (t)->lane_rays->lane))
+/* Expands to a vector with one number of each ray's tet: the given member of kernel_transformed_tets. */
+#define KERNEL_TET_NUMBER(t, member)                                                                                   \
+    ((t)->is_uniform ? vf_set((t)->transformed->member[(t)->lane])                                                     \
+                     : vf_permute((t)->transformed->member, (t)->lane_rays->lane))
 
 /* Returns a copy of *t, to be passed to a function that is not inlined, so that the original stays in registers. rays:
  * memory for a copy of the lane rays. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
 {
     kernel_tets out = *t;
-    if (t->is_one) return out;
     *rays = *t->lane_rays;
     out.lane_rays = rays;
     out.is_uniform = false;
@@ -47,11 +41,11 @@ SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays 
 
 SIMD_INLINE void kernel_tets_project(const kernel_tets *t, vf x[4], vf y[4])
 {
-    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->lane_rays->rays;
+    const kernel_rays rays = t->lane_rays->rays;
     for (int i = 0; i < 4; i++) {
-        const vf z = KERNEL_TET_NUMBER(t, z[i], at[2][i]);
-        x[i] = (KERNEL_TET_NUMBER(t, x[i], at[0][i]) - rays.origin_x) - rays.slope_x * z;
-        y[i] = (KERNEL_TET_NUMBER(t, y[i], at[1][i]) - rays.origin_y) - rays.slope_y * z;
+        const vf z = KERNEL_TET_NUMBER(t, at[2][i]);
+        x[i] = (KERNEL_TET_NUMBER(t, at[0][i]) - rays.origin_x) - rays.slope_x * z;
+        y[i] = (KERNEL_TET_NUMBER(t, at[1][i]) - rays.origin_y) - rays.slope_y * z;
     }
 }
 
@@ -71,7 +65,7 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
     vf exact[KERNEL_TET_EDGES];
     kernel_tets_edges_projected(t, exact);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const vm sure = vf_lt(KERNEL_TET_NUMBER(t, lines[n].bound, bound[n]), vf_abs(e[n]));
+        const vm sure = vf_lt(KERNEL_TET_NUMBER(t, bound[n]), vf_abs(e[n]));
         e[n] = vf_select(sure, e[n], exact[n]);
     }
 }
@@ -80,20 +74,20 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
  * the tile's pixels, for which the edges' lines are valid (kernel_cell.h). */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
-    const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
+    const vf u = t->lane_rays->u, v = t->lane_rays->v;
     vf least = vf_set(INFINITY);
     if (!is_pencil) {
         kernel_tets_edges_projected(t, e);
         return;
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const vf c = KERNEL_TET_NUMBER(t, lines[n].c, c[n]);
-        const vf cu = KERNEL_TET_NUMBER(t, lines[n].cu, cu[n]);
-        const vf cv = KERNEL_TET_NUMBER(t, lines[n].cv, cv[n]);
+        const vf c = KERNEL_TET_NUMBER(t, c[n]);
+        const vf cu = KERNEL_TET_NUMBER(t, cu[n]);
+        const vf cv = KERNEL_TET_NUMBER(t, cv[n]);
         e[n] = vf_muladd(cv, v, vf_muladd(cu, u, c));
         least = vf_min(vf_abs(e[n]), least);
     }
-    if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt, doubt), least))), 0)) {
+    if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt), least))), 0)) {
         kernel_lane_rays lane_rays;
         const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
         kernel_tets_in_double(&copy, e);
@@ -111,24 +105,24 @@ SIMD_INLINE void kernel_tets_find_crossed_faces(vm rays, const vf e[KERNEL_TET_E
 
 /* At the crossings of a face: the sums of the depths, values and colour values of the face's three vertices, each
  * multiplied by the vertex's weight (kernel_cell.h), and the sum of the weights. A sum divided by the sum of the
- * weights is the number at the crossing. Only rays that have a tet each may have colour values. */
+ * weights is the number at the crossing. */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
 
-#define KERNEL_TET_WEIGH(t, face, ij, jk, ik, of_one, of_transformed)                                                  \
-    vf_muladd(ij, KERNEL_TET_NUMBER(t, of_one[(int)(face)[2]], of_transformed[(int)(face)[2]]),                        \
-              vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_transformed[(int)(face)[1]]),           \
-                        (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_transformed[(int)(face)[0]])))
+#define KERNEL_TET_WEIGH(t, face, ij, jk, ik, member)                                                                  \
+    vf_muladd(ij, KERNEL_TET_NUMBER(t, member[(int)(face)[2]]),                                                        \
+              vf_muladd(-(ik), KERNEL_TET_NUMBER(t, member[(int)(face)[1]]),                                           \
+                        (jk)*KERNEL_TET_NUMBER(t, member[(int)(face)[0]])))
 
 /* Returns the weighted sums of a face (kernel_sums). face: its entry of kernel_tet_face; ij, jk, ik: its edge
  * functions; has_colour: set if the colour field is included. */
 SIMD_INLINE kernel_sums kernel_tets_weighted_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
                                                   bool has_colour)
 {
-    return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, z, at[2]),
-                         .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, f),
-                         .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, colours) : vf_set(0),
+    return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, at[2]),
+                         .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f),
+                         .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, colours) : vf_set(0),
                          .weight = kernel_weight(ij, jk, ik)};
 }
 
@@ -180,13 +174,14 @@ SIMD_INLINE void kernel_tets_set_interval(const kernel_sums ends[2], bool has_co
 /* Returns those of the rays that cross face n (hit) whose sum of weights is too small for an accurate crossing. */
 SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
 {
-    return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
+    return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n])));
 }
 
 /* Selects the sums of the two crossed faces as kernel_tets_select_crossed_faces() does. But for rays on which a face's
- * weights are not accurate enough, the sums are first computed anew from edge functions of projected vertices. */
-SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
-                                              bool has_colour, kernel_sums ends[2])
+ * weights are not accurate enough, the sums are first computed anew from edge functions of projected vertices. It is
+ * not inlined, because few rays have inaccurate weights. */
+static __attribute__((noinline, cold)) void
+kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour, kernel_sums ends[2])
 {
     vf exact[KERNEL_TET_EDGES];
     kernel_sums sums[4];
@@ -202,19 +197,6 @@ SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, con
                                       vf_select(weak, exact[ik], e[ik]), has_colour);
     }
     kernel_tets_select_crossed_faces(hit, sums, ends);
-}
-
-/* Calls kernel_tets_choose_in_double() with is_one as a compile-time constant. It is not inlined, because few packets
- * have inaccurate weights. */
-static __attribute__((noinline, cold)) void
-kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour, kernel_sums ends[2])
-{
-    const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
-    const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};
-    if (t->is_one)
-        kernel_tets_choose_in_double(&one, rays, e, false, ends);
-    else
-        kernel_tets_choose_in_double(&several, rays, e, has_colour, ends);
 }
 
 /* Computes the depths at which the rays enter and leave their tets, the values there, and the rays that cross each face
@@ -250,17 +232,6 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     kernel_tets_set_interval(ends, has_colour, out);
 }
 
-/* ---- packets and one tet ---- */
-
-SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
-{
-    const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
-    vm hit[4];
-    kernel_tets_interval(&tet, rays, p->is_pencil, false, hit, out);
-}
-
-/* ---- rays with a tet each ---- */
-
 /* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_pencil: whether the edges'
  * lines are used (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
@@ -278,13 +249,14 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transfo
     kernel_tet_rays_cross(transformed, r, true, has_colour, hit, out);
 }
 
-/* Does the same as kernel_tet_rays_interval() without colours, for rays that all have the tet in the given lane. */
+/* Does the same as kernel_tet_rays_interval() without colours, for rays that all have the tet in the given lane.
+ * is_pencil: as above. */
 SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
-                                                 int lane, kernel_interval *out)
+                                                 int lane, bool is_pencil, kernel_interval *out)
 {
     const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = true, .lane = lane};
     vm hit[4];
-    kernel_tets_interval(&tets, r->active, true, false, hit, out);
+    kernel_tets_interval(&tets, r->active, is_pencil, false, hit, out);
 }
 
 #endif

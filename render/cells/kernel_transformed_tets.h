@@ -18,8 +18,9 @@
 #include "simd.h"
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
- * members of kernel_line, by edge; doubt, least: as in kernel_cell; vertex: indices in the mesh. The caller sets f, the
- * values as the layer needs them, and colours, the values of the colour field, if the layer has one. */
+ * members of kernel_line, by edge; doubt: the largest bound of the tet's edge functions; least: for each face, the
+ * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices in the mesh. The caller
+ * sets f, the values as the layer needs them, and colours, the values of the colour field, if the layer has one. */
 typedef struct kernel_transformed_tets {
     /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
     kernel_f64 world[4][3][2], values[4][2];
@@ -110,6 +111,16 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
     else
         kernel_transformed_sort(out, p, false, vertices);
     kernel_transform_sorted_tets(out, f, tile, is_pencil);
+}
+
+/* Sets all lanes to a tet in tile space, without edge functions. */
+SIMD_INLINE void kernel_transformed_tets_set(kernel_transformed_tets *out, const kernel_cell *c)
+{
+    const float *const at[3] = {c->x, c->y, c->z};
+    for (int i = 0; i < 4; i++) {
+        for (int a = 0; a < 3; a++) out->at[a][i] = vf_set(at[a][i]);
+        out->f[i] = vf_set(c->f[i]);
+    }
 }
 
 /* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. is_pencil: as above.

@@ -17,6 +17,8 @@
 #include "kernel_packet.h"
 #include "kernel_tets.h"
 #include "kernel_tile.h"
+#include "kernel_tile_trace.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
@@ -54,6 +56,15 @@ SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
         c->f[i] = kernel_clamp((c->values[i] - probe->isovalue) * probe->surface->value_scale, 1e18);
 }
 
+/* Computes the interval of the rays in the tet c, which must be in tile space. */
+SIMD_INLINE void kernel_probe_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
+{
+    const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays};
+    kernel_transformed_tets tet;
+    kernel_transformed_tets_set(&tet, c);
+    kernel_tet_rays_interval_in_one(&tet, &r, 0, false, out);
+}
+
 /* Takes the sample in the cell c on those of the given rays whose sample point lies in it. A ray that already has a
  * sample keeps the lesser of the two values. */
 SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
@@ -62,7 +73,7 @@ SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe,
     const bool is_tet = kernel_is_linear(c->type);
     int count = 1;
     if (is_tet)
-        kernel_tet_interval(p, c, rays, &list[0]);
+        kernel_probe_tet_interval(p, c, rays, &list[0]);
     else
         count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
@@ -111,7 +122,7 @@ static void kernel_probe_sample_leaf(kernel_packet *p, kernel_probe *probe, int 
         kernel_cell *c = kernel_cell_cache_find(p, probe->layer, part, &field->fields[part], cells[n]);
         if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
         const bool is_fresh = !c->is_transformed;
-        if (is_fresh) kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
+        if (is_fresh) kernel_cell_transform_in_tile(c, p->frame, p->tile, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
         const vm near = kernel_probe_in_box(p, probe, c, rays);
         if (vm_any(near)) kernel_probe_sample_cell(p, probe, c, near);

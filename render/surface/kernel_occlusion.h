@@ -20,7 +20,6 @@
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
 #include "kernel_surface.h"
-#include "kernel_tets.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_polyhedra.h"
@@ -73,15 +72,6 @@ SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *
     p->t_far = vf_select(hit, vf_set(-INFINITY), p->t_far);
     p->active = vm_andnot(p->active, hit);
     return hit;
-}
-
-/* Makes the rays inactive that the surface in a tet blocks. */
-SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *o, const kernel_cell *c, vm rays)
-{
-    kernel_interval i;
-    kernel_tet_interval(p, c, rays, &i);
-    const vm change = vm_and(kernel_interval_overlaps_ray(p, &i), kernel_changes_sign(&i));
-    if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
 /* Finds the roots in the rays' interval i one after the other, until each ray is blocked or has no more roots. */
@@ -174,7 +164,8 @@ SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell 
     c->has_lines = false;
 }
 
-/* Removes the rays that the cell's surface blocks from the packet's active rays. */
+/* Removes the rays that the cell's surface blocks from the packet's active rays. The cell is not a tet, because rays
+ * are never undecided in tets (kernel_occluders.h). */
 static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const render_surface_layer *layer = o->surface->layer;
@@ -189,10 +180,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     o->vertex_count = c->count;
     kernel_occlusion_transform(p, c, occluder->part);
     kernel_cell_subtract_isovalue(c, layer->values[occluder->value]);
-    if (kernel_is_linear(c->type))
-        kernel_occlusion_tet(p, o, c, p->active);
-    else
-        kernel_occlusion_curved(p, o, c, p->active);
+    kernel_occlusion_curved(p, o, c, p->active);
 }
 
 /* Clears the `open` bits of the bundle's rays that the surface in the occluder's cell blocks. */
