@@ -1,9 +1,9 @@
 /* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
  * their triangular faces. The operations are those of kernel_cell_subtract_isovalue(), kernel_transform_in_tile(),
- * kernel_cell_order() and kernel_curved_lines(), so the results are bit-identical. Vertices are put in canonical order
- * first (kernel_cell_canonical_order()), so that all data are stored in that order. Computations in double are done for
- * one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a constant, so that loops have
- * constant lengths. */
+ * kernel_cell_order() and kernel_cell_compute_lines(), so the results are bit-identical. Vertices are put in canonical
+ * order first (kernel_cell_canonical_order()), so that all data are stored in that order. Computations in double are
+ * done for one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a constant, so that loops
+ * have constant lengths. */
 #ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
 #define RENDER_KERNEL_TRANSFORMED_CURVED_H
 

@@ -1,5 +1,5 @@
 /* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of
- * kernel_cell_move_to_tile_space(), kernel_cell_order() and kernel_tet_lines(), so the results are bit-identical.
+ * kernel_cell_move_to_tile_space() and kernel_cell_order(), so the results are bit-identical.
  * Vertices are sorted by coordinates first, so that all data are stored in that order. Computations in double are done
  * for one half of the lanes (kernel_wide.h) after the other. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
