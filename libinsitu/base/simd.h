@@ -311,11 +311,12 @@ SIMD_INLINE vf vf_floor(vf a)
 #endif
 
 #if !defined(SIMD_AVX2)
+/* memcpy() allows callers to gather integers as floats of the same bits. */
 SIMD_INLINE vf vf_gather(const float *base, vi index)
 {
-    vf v;
-    for (int i = 0; i < SIMD_WIDTH; i++) v[i] = base[index[i]];
-    return v;
+    float v[SIMD_WIDTH];
+    for (int i = 0; i < SIMD_WIDTH; i++) memcpy(v + i, base + index[i], sizeof *v);
+    return vf_load(v);
 }
 #endif
 

@@ -279,11 +279,13 @@ SIMD_INLINE void kernel_pixel_list_add_blocks(kernel_pixel_list *rays, unsigned 
     }
 }
 
-/* Pads the list with zeros, so that its last rays can be read as a whole vector. */
+/* Pads the list with copies of its last ray, so that its last rays can be read as a whole vector of rays whose packets
+ * have been set up. */
 SIMD_INLINE void kernel_pixel_list_pad(kernel_pixel_list *rays)
 {
-    memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
-    memset(rays->lane + rays->count, 0, SIMD_WIDTH);
+    const int last = rays->count - 1;
+    memset(rays->pixel + rays->count, last < 0 ? 0 : rays->pixel[last], SIMD_WIDTH);
+    memset(rays->lane + rays->count, last < 0 ? 0 : rays->lane[last], SIMD_WIDTH);
 }
 
 SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)

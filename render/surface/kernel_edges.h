@@ -110,10 +110,10 @@ static __attribute__((noinline)) void kernel_set_polygon_distances(const kernel_
 {
     const render_part *part = &p->frame->job->parts[h->part[0]];
     for (unsigned left = vm_bits(hit); left;) {
-        const int64_t cell = h->cell[__builtin_ctz(left)];
+        const uint32_t cell = (uint32_t)h->cell[__builtin_ctz(left)];
         unsigned same = 0;
         for (unsigned more = left; more; more &= more - 1)
-            if (h->cell[__builtin_ctz(more)] == cell) same |= more & -more;
+            if ((uint32_t)h->cell[__builtin_ctz(more)] == cell) same |= more & -more;
         left &= ~same;
         if (!part->loops[cell]) continue;
         vf longest = vf_set(0);
