@@ -376,13 +376,20 @@ SIMD_INLINE int kernel_packet_of_pixel(int pixel)
     return block * KERNEL_BLOCK_PACKETS + within;
 }
 
+/* Returns the positions of a packet's rays among the tile's packets. */
+SIMD_INLINE vi kernel_packet_places(int packet)
+{
+    static const int32_t ramp[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    vi lanes;
+    memcpy(&lanes, ramp, sizeof lanes);
+    return packet * SIMD_WIDTH + lanes;
+}
+
 /* Sets the rays to all rays of a packet, which share the cell in the given lane. packet: its index in the tile. */
 SIMD_INLINE void kernel_lane_rays_of_packet(kernel_lane_rays *out, const kernel_tile_trace *t, int packet, int lane)
 {
-    static const int32_t ramp[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     const kernel_packet *p = &t->packets[packet];
-    memcpy(&out->at, ramp, sizeof out->at);
-    out->at += packet * SIMD_WIDTH;
+    out->at = kernel_packet_places(packet);
     out->lane = vi_set(lane);
     out->rays = kernel_packet_rays(p);
     out->active = p->active;

@@ -34,35 +34,6 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
     return any;
 }
 
-/* Returns the active rays whose interval in the cell overlaps the depths from reach[0] to reach[1] in front of the
- * nearest opaque hit, and computes where the overlap begins and ends. */
-SIMD_INLINE vm kernel_interval_between(const kernel_packet *p, const kernel_interval *i, const vf reach[2], vf *from,
-                                       vf *end)
-{
-    *from = vf_max(i->t_in, reach[0]);
-    *end = vf_min(i->t_out, reach[1]);
-    return vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(*from, *end), vf_lt(*from, p->t_far))));
-}
-
-/* Cuts each ray's interval, on which the field is linear, at transparent surfaces, and adds those of the resulting
- * segments that begin in the window. whole: the interval as one segment; reach: first and last depth of the segments to
- * add. */
-static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet *p, kernel_segments *list,
-                                                             const kernel_interval *i, const vf reach[2],
-                                                             const kernel_unit_segment *whole)
-{
-    vf from, end;
-    vm open = kernel_interval_between(p, i, reach, &from, &end);
-    while (vm_any(open)) {
-        const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
-        const kernel_unit_segment part =
-            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
-        kernel_segments_add(list, vm_and(open, vf_le(list->t_begin, from)), from, to, &part);
-        from = to;
-        open = vm_and(open, vf_lt(from, end));
-    }
-}
-
 /* Bisection divides those parts of a ray's interval in a cell for which no number of equal segments is accurate enough.
  * At a step of the opacity there is no slope that would bound the effect of a small field error on the light. If a
  * curved field barely reaches the step, the length beyond the step grows with the square root of the excess: at 800
@@ -321,7 +292,7 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
 /* Adds the subinterval as a segment whose field is the chord. Equal segments are raised so that their mean is that of
  * the field (kernel_local_budget.h). This one is not, because it might then reach values for which no error bound has
  * been computed. */
-static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, const kernel_exact_point *from,
+static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {
     const bool is_cut = kernel_step_between(h, sub->low, sub->high) != NULL;
@@ -332,7 +303,9 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, c
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(side, x[i], &v[i], &rest[i]);
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
     const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
-    if (h->list->is_double || t0 < t1) kernel_segments_add(h->list, lane, vf_set(t0), vf_set(t1), &run);
+    if (h->list->is_double || t0 < t1)
+        kernel_segments_add(h->list, h->list->is_double, vi_set(lane), vm_from_bits(1u << lane), vf_set(t0), vf_set(t1),
+                            &run);
 }
 
 /* ---- bisection of an interval ---- */
@@ -355,7 +328,6 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 static void kernel_subinterval_bisect(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
 {
     const kernel_segments *list = h->list;
-    const vm only = vm_from_bits(1u << lane);
     kernel_subinterval stack[KERNEL_BISECTION_ROOM];
     int count = 1;
     stack[0] = whole;
@@ -370,7 +342,7 @@ static void kernel_subinterval_bisect(kernel_bisection *h, int lane, kernel_exac
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
         if (is_last || kernel_subinterval_is_good(h, &sub, &s, length, step != NULL)) {
-            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segment(h, only, &from, &sub);
+            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segment(h, lane, &from, &sub);
             const double depth = (double)s.extinction_low * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
             h->count++;
@@ -435,20 +407,6 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
 
 /* ---- cells in which the field is linear ---- */
 
-/* Adds the rays' intervals in a hex, wedge or pyramid whose field is constant as segments. The value is computed in
- * double if list->is_double is set, because narrow ramps magnify its rounding. reach: first and last depth of the
- * segments to add. */
-static __attribute__((noinline)) void kernel_constant_segments(const kernel_packet *p, kernel_segments *list,
-                                                               const kernel_cell *c, const kernel_interval *i,
-                                                               const vf reach[2])
-{
-    const double exact = kernel_double_domain(&p->frame->volumes[list->volume], c->values[0]);
-    const vf value = vf_set((float)exact);
-    kernel_unit_segment whole = kernel_unit_segment_of((i->t_out - i->t_in) * list->per_t, value, value);
-    if (list->is_double) whole.rest_in = whole.rest_out = vf_set((float)(exact - (double)(float)exact));
-    kernel_linear_segments(p, list, i, reach, &whole);
-}
-
 /* The following functions compute samples and segments in polyhedra, where the field along a ray is piecewise linear:
  * the ray's profile (kernel_polyhedron.h). */
 
@@ -495,28 +453,6 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_samples *s, int pa
     kernel_poly_crossings r;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, s, &r);
-}
-
-/* Adds the segments of the given rays in a polyhedron: the linear pieces of their profiles, on which the field is
- * exactly linear. */
-static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, int part, uint32_t index, vm rays)
-{
-    const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);
-    kernel_poly_crossings r;
-    kernel_interval piece;
-    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r)) {
-        if (!c->is_constant) kernel_poly_prepare_profile(&r);
-        kernel_profile_begin(&r, &piece);
-        for (;;) {
-            piece.mask = kernel_profile_continues(&r, &piece, piece.mask);
-            if (!vm_any(piece.mask)) break;
-            kernel_profile_next(&r, r.u_out, &piece);
-            const kernel_unit_segment whole =
-                kernel_unit_segment_of((piece.t_out - piece.t_in) * list->per_t, piece.v_in, piece.v_out);
-            kernel_linear_segments(p, list, &piece, (const vf[2]){p->t_near, list->t_cut}, &whole);
-        }
-    }
 }
 
 #endif

@@ -61,17 +61,72 @@ typedef struct kernel_tile_segments {
     kernel_double_faces faces;
 } kernel_tile_segments;
 
+/* ---- surfaces that cut segments ---- */
+
+/* Does the same as kernel_local_next_cut(), if rays may have more cuts than kernel_hits stores. */
+static __attribute__((noinline, cold)) vf
+kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
+{
+    int32_t at[SIMD_WIDTH];
+    float next[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    vf_store(next, vf_set(INFINITY));
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits), packet = at[i] / SIMD_WIDTH;
+        next[i] = kernel_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
+    }
+    return vf_load(next);
+}
+
+/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
+ * none. places: position of each ray among the tile's packets. */
+static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
+                                                          vi places, vm rays, vf from)
+{
+    enum { HITS = sizeof(kernel_hits) / sizeof(float) };
+    vf next = vf_set(INFINITY);
+    if (!b->has_cuts) return next;
+    if (b->has_overflowed) return kernel_local_next_cut_singly(t, b, places, rays, from);
+    const vi hits = places / SIMD_WIDTH * HITS, at = hits + (places & (SIMD_WIDTH - 1));
+    const vf bits = vf_gather((const float *)(const void *)&t->hits[0].cut_count, hits);
+    const vf count = vf_select(rays, vf_from_vi(vi_from_bits(bits)), vf_set(0));
+    for (int n = 0; vm_any(vf_lt(vf_set((float)n), count)); n++) {
+        const vf cut = vf_gather((const float *)(const void *)&t->hits[0].cut[n], at);
+        const vm behind = vm_and(vf_lt(vf_set((float)n), count), vf_lt(from, cut));
+        next = vf_select(behind, vf_min(cut, next), next);
+    }
+    return next;
+}
+
+/* Adds the segments of the given rays, on whose intervals i the field is linear. It cuts the intervals at surfaces, and
+ * adds the parts between the depths reach[0] and reach[1] that begin in the rays' windows. places: position of each ray
+ * among the tile's packets; whole: the intervals as segments. */
+static __attribute__((noinline)) void kernel_linear_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
+                                                             vi places, vm rays, const kernel_interval *i,
+                                                             const vf reach[2], const kernel_unit_segment *whole)
+{
+    const vf begin = vf_gather(s->window, 2 * places), end = vf_min(i->t_out, reach[1]);
+    vf from = vf_max(i->t_in, reach[0]);
+    for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
+        const vf to = vf_min(end, kernel_local_next_cut(t, s, places, open, from));
+        const kernel_unit_segment part =
+            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
+        kernel_segments_add(s->packets, s->is_double, places, vm_and(open, vf_le(begin, from)), from, to, &part);
+        from = to;
+    }
+}
+
+/* ---- intervals of rays ---- */
+
 /* Adds one segment per lane, in the lanes `rays`, to the list of the lane's ray. places: position of each ray among the
  * tile's packets; v_in, v_out: values in the transfer function's domain. */
 SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, vf t_in, vf t_out, vf v_in,
                                              vf v_out)
 {
-    int32_t at[SIMD_WIDTH];
-    memcpy(at, &places, sizeof at);
     vf length = vf_set(0);
     if (b->is_double) length = (t_out - t_in) * vf_gather(b->per_t, places);
     const kernel_unit_segment run = kernel_unit_segment_of(length, v_in, v_out);
-    kernel_segments_add_at(b->packets, b->is_double, at, rays, t_in, t_out, &run);
+    kernel_segments_add(b->packets, b->is_double, places, rays, t_in, t_out, &run);
 }
 
 /* The following two functions evaluate a polynomial in u that is 0 at u = -1/2 and 1/2, and has the coefficients f:
@@ -192,6 +247,21 @@ static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_tr
 
 /* ---- packets of rays in one cell ---- */
 
+/* Adds the rays' intervals in a hex, wedge or pyramid whose field is constant as segments. The value is computed in
+ * double if s->is_double is set, because narrow ramps magnify its rounding. reach: first and last depth of the
+ * segments to add. */
+static __attribute__((noinline)) void kernel_constant_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
+                                                               vi places, const kernel_cell *c,
+                                                               const kernel_interval *i, const vf reach[2])
+{
+    const double exact = kernel_double_domain(&t->frame->volumes[s->volume], c->values[0]);
+    const vf value = vf_set((float)exact);
+    kernel_unit_segment whole =
+        kernel_unit_segment_of((i->t_out - i->t_in) * vf_gather(s->per_t, places), value, value);
+    if (s->is_double) whole.rest_in = whole.rest_out = vf_set((float)(exact - (double)(float)exact));
+    kernel_linear_segments(t, s, places, i->mask, i, reach, &whole);
+}
+
 /* Adds the segments of a packet's rays in a hex, wedge or pyramid, between the depths reach[0] and reach[1]. share:
  * length between these depths, as a share of the rays' intervals in the cell; map: the cell's inverse map, NULL if the
  * field is constant. */
@@ -205,17 +275,21 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
     kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
     kernel_local_bounds bounds;
     kernel_local_chord chord = {.packet = p, .map = map, .cell = c};
-    kernel_local_pairs whole = {.begin = list->t_begin, .per_t = list->per_t, .share = share};
+    kernel_local_pairs whole = {
+        .begin = list->t_begin, .per_t = list->per_t, .share = share, .rays.at = kernel_packet_places(packet)};
     const int count = kernel_curved_intervals(p, c, rays, intervals);
     if (count && map) kernel_local_bound_of_cell(t->frame, b->volume, c, &bounds);
-    for (int i = 0; i < SIMD_WIDTH; i++) whole.rays.at[i] = packet * SIMD_WIDTH + i;
     for (int k = 0; k < count; k++) {
-        vf from, end;
+        const vf end = vf_min(intervals[k].t_out, reach[1]);
+        vf from = vf_max(intervals[k].t_in, reach[0]);
+        vm open = vm_and(intervals[k].mask, vf_lt(from, end));
         chord.interval = &intervals[k];
-        if (!map) kernel_constant_segments(p, list, c, &intervals[k], reach);
-        vm open = map ? kernel_interval_between(p, &intervals[k], reach, &from, &end) : vm_none();
+        if (!map) {
+            kernel_constant_segments(t, b, whole.rays.at, c, &intervals[k], reach);
+            continue;
+        }
         for (; vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-            const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
+            const vf to = vf_min(end, kernel_local_next_cut(t, b, whole.rays.at, open, from));
             const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
             whole.ends[0].t = from;
             whole.ends[1].t = from = to;
@@ -256,41 +330,6 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
         kernel_curved_segments(t, packet, &cells->cell, cells->cell.is_constant ? NULL : &cells->map,
                                vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
     }
-}
-
-/* Does the same as kernel_local_next_cut(), if rays may have more cuts than kernel_hits stores. */
-static __attribute__((noinline, cold)) vf
-kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
-{
-    int32_t at[SIMD_WIDTH];
-    float next[SIMD_WIDTH];
-    memcpy(at, &places, sizeof at);
-    vf_store(next, vf_set(INFINITY));
-    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits), packet = at[i] / SIMD_WIDTH;
-        next[i] = kernel_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
-    }
-    return vf_load(next);
-}
-
-/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
- * none. places: position of each ray among the tile's packets. */
-static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
-                                                          vi places, vm rays, vf from)
-{
-    enum { HITS = sizeof(kernel_hits) / sizeof(float) };
-    vf next = vf_set(INFINITY);
-    if (!b->has_cuts) return next;
-    if (b->has_overflowed) return kernel_local_next_cut_singly(t, b, places, rays, from);
-    const vi hits = places / SIMD_WIDTH * HITS, at = hits + (places & (SIMD_WIDTH - 1));
-    const vf bits = vf_gather((const float *)(const void *)&t->hits[0].cut_count, hits);
-    const vf count = vf_select(rays, vf_from_vi(vi_from_bits(bits)), vf_set(0));
-    for (int n = 0; vm_any(vf_lt(vf_set((float)n), count)); n++) {
-        const vf cut = vf_gather((const float *)(const void *)&t->hits[0].cut[n], at);
-        const vm behind = vm_and(vf_lt(vf_set((float)n), count), vf_lt(from, cut));
-        next = vf_select(behind, vf_min(cut, next), next);
-    }
-    return next;
 }
 
 /* Adds the segments of rays whose intervals are cut by surfaces, between the depths reach[0] and reach[1]. */

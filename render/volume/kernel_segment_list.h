@@ -172,13 +172,15 @@ SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const f
 }
 
 /* Adds one segment per lane, from t_in to t_out, to the list of the lane's ray, unless the ray's window ends in front
- * of t_in. Segments must not begin in front of the rays' windows. at: position of each ray among the tile's packets
+ * of t_in. Segments must not begin in front of the rays' windows. places: position of each ray among the tile's packets
  * (packet * SIMD_WIDTH + lane), whose lists begin at `packets`; rays: mask of the lanes that have a segment; run:
  * values at the segments' ends. run->length is used only if the lists are in double. */
-SIMD_INLINE void kernel_segments_add_at(kernel_segments *packets, bool is_double, const int32_t at[SIMD_WIDTH], vm rays,
-                                        vf t_in, vf t_out, const kernel_unit_segment *run)
+SIMD_INLINE void kernel_segments_add(kernel_segments *packets, bool is_double, vi places, vm rays, vf t_in, vf t_out,
+                                     const kernel_unit_segment *run)
 {
+    int32_t at[SIMD_WIDTH];
     float all[SIMD_WIDTH][4], doubles[SIMD_WIDTH][4];
+    vi_store(at, places);
     const vf ends[4] = {t_in, t_out, run->v_in, run->v_out};
     const vf precise[4] = {run->length, run->rest_in, run->rest_out, vf_set(0)};
     vf_store_rows(all[0], ends);
@@ -193,14 +195,6 @@ SIMD_INLINE void kernel_segments_add_at(kernel_segments *packets, bool is_double
                                          vf_set(run->rest_in[i]), vf_set(run->rest_out[i])};
         kernel_integrate(list->pieces, vm_from_bits(1u << lane), &own, &list->unsorted_light);
     }
-}
-
-/* Adds one segment per ray of a packet to the list of the packet's rays; otherwise as kernel_segments_add_at(). */
-static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out,
-                                                          const kernel_unit_segment *run)
-{
-    static const int32_t own[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    if (vm_any(rays)) kernel_segments_add_at(list, list->is_double, own, rays, t_in, t_out, run);
 }
 
 /* Gathers one of the four floats of a segment, for one segment per ray. member: 0 for t_in, 1 for t_out, 2 for v_in, 3

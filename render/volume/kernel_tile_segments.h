@@ -41,6 +41,32 @@
 
 /* ---- cells ---- */
 
+/* Adds the segments of the packet's rays in a polyhedron: the linear pieces of their profiles, on which the field is
+ * exactly linear. */
+static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, int part, uint32_t index)
+{
+    kernel_tile_segments *s = t->thread->tile_segments;
+    kernel_packet *p = &t->packets[packet];
+    const kernel_segments *list = &s->packets[packet];
+    const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);
+    kernel_poly_crossings r;
+    kernel_interval piece;
+    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
+    while (kernel_poly_next(&r)) {
+        if (!c->is_constant) kernel_poly_prepare_profile(&r);
+        kernel_profile_begin(&r, &piece);
+        for (;;) {
+            piece.mask = kernel_profile_continues(&r, &piece, piece.mask);
+            if (!vm_any(piece.mask)) break;
+            kernel_profile_next(&r, r.u_out, &piece);
+            const kernel_unit_segment whole =
+                kernel_unit_segment_of((piece.t_out - piece.t_in) * list->per_t, piece.v_in, piece.v_out);
+            kernel_linear_segments(t, s, kernel_packet_places(packet), piece.mask, &piece,
+                                   (const vf[2]){p->t_near, list->t_cut}, &whole);
+        }
+    }
+}
+
 /* Adds the segments of the rays of the given blocks in the cell. */
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                       unsigned blocks)
@@ -51,7 +77,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
             if (kernel_has_own_faces(c->type))
-                kernel_polyhedron_segments(p, &s->packets[i], part, c->index, p->active);
+                kernel_polyhedron_segments(t, i, part, c->index);
             else
                 kernel_curved_segments(t, i, c, map, p->active, (const vf[2]){p->t_near, s->packets[i].t_cut}, 1);
         }
@@ -60,28 +86,6 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
 }
 
 /* ---- tets ---- */
-
-/* Adds the segments of rays that are cut by surfaces, or begin or end inside their tet. places: position of each ray
- * among the tile's packets; i: the rays' intervals; whole: the intervals as segments. */
-static __attribute__((noinline)) void kernel_tet_segments_cut(const kernel_tile_trace *t, kernel_tile_segments *s,
-                                                              vi places, const kernel_interval *i, vm rays,
-                                                              const kernel_unit_segment *whole)
-{
-    int32_t at[SIMD_WIDTH];
-    vf near, far;
-    memcpy(at, &places, sizeof at);
-    vf_gather_pair(s->reach, 2 * places, &near, &far);
-    const vf begin = vf_gather(s->window, 2 * places);
-    const vf last = vf_min(i->t_out, far);
-    vf from = vf_max(i->t_in, near);
-    for (vm open = vm_and(rays, vf_lt(from, last)); vm_any(open); open = vm_and(open, vf_lt(from, last))) {
-        const vf to = vf_min(last, kernel_local_next_cut(t, s, places, open, from));
-        const kernel_unit_segment part =
-            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
-        kernel_segments_add_at(s->packets, s->is_double, at, vm_and(open, vf_le(begin, from)), from, to, &part);
-        from = to;
-    }
-}
 
 /* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double.
  * lanes: lane of each ray's tet; first, second: numbers of the two faces that it crosses. */
@@ -118,13 +122,11 @@ SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_seg
     kernel_unit_segment run = kernel_unit_segment_of(i.t_out - i.t_in, i.v_in, i.v_out);
     if (s->is_double)
         kernel_tet_segments_refine(s, places, r->lane, kernel_tets_first_face(hit), kernel_tets_second_face(hit), &run);
-    int32_t at[SIMD_WIDTH];
-    memcpy(at, &places, sizeof at);
     /* segments are kept if their length is positive, not if t_in < t_out, because in double the length may be positive
      * although both depths are the same float32 */
-    kernel_segments_add_at(s->packets, s->is_double, at, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out,
-                           &run);
-    if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, places, &i, cut, &run);
+    kernel_segments_add(s->packets, s->is_double, places, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out,
+                        &run);
+    if (__builtin_expect(vm_any(cut), 0)) kernel_linear_segments(t, s, places, cut, &i, (const vf[2]){near, far}, &run);
 }
 
 /* Adds the segments in the current vector of tets. */
