@@ -25,7 +25,7 @@ enum {
 static const char *program;
 
 /* Sets an opacity with steps and a narrow ramp. Segments in which they lie are bisected in double
- * (kernel_cell_segments.h), ray by ray, from the caller's coordinates. */
+ * (kernel_bisection.h), ray by ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {
     static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};

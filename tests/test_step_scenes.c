@@ -55,7 +55,7 @@ static void lattices_of_curved_cells_keep_max_error(void **state)
 /* Draws two volumes of one field, sampled with a step of the size of a cell. The opacity of the first volume is
  * constant except for a step; that of the second volume is constant. A curved field causes errors only at the step,
  * whose intervals are halved. Each interval is allowed a share of 0.4 RENDER_MIXING_ERROR in proportion to its length,
- * and another share in proportion to its absorption (kernel_cell_segments.h), in addition to the error of mixing
+ * and another share in proportion to its absorption (kernel_bisection.h), in addition to the error of mixing
  * itself. */
 static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {

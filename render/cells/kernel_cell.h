@@ -361,19 +361,29 @@ static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
     for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];
 }
 
-/* Transforms a position in world coordinates into tile space (kernel_types.h). */
-SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
-                                          float *out_x, float *out_y, float *out_z)
+/* Transforms a position in world coordinates into tile space (kernel_types.h), in double. */
+SIMD_INLINE void kernel_transform_in_double(const kernel_frame *f, const kernel_tile *tile, const double *world,
+                                            double out[3])
 {
     const double *eye = f->job->camera.eye;
     const double d0 = world[0] - eye[0], d1 = world[1] - eye[1], d2 = world[2] - eye[2];
-    const double x = f->scaled_axes[0][0] * d0 + f->scaled_axes[0][1] * d1 + f->scaled_axes[0][2] * d2;
-    const double y = f->scaled_axes[1][0] * d0 + f->scaled_axes[1][1] * d1 + f->scaled_axes[1][2] * d2;
-    const double z = f->scaled_axes[2][0] * d0 + f->scaled_axes[2][1] * d1 + f->scaled_axes[2][2] * d2;
-    const double depth = f->job->camera.is_orthographic ? f->job->space.scale : z;
-    *out_x = (float)(x - tile->centre_x * depth);
-    *out_y = (float)(y - tile->centre_y * depth);
-    *out_z = (float)(z - tile->depth_shift);
+    for (int a = 0; a < 3; a++)
+        out[a] = f->scaled_axes[a][0] * d0 + f->scaled_axes[a][1] * d1 + f->scaled_axes[a][2] * d2;
+    const double depth = f->job->camera.is_orthographic ? f->job->space.scale : out[2];
+    out[0] -= tile->centre_x * depth;
+    out[1] -= tile->centre_y * depth;
+    out[2] -= tile->depth_shift;
+}
+
+/* As above, with coordinates rounded to float32. */
+SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
+                                          float *out_x, float *out_y, float *out_z)
+{
+    double at[3];
+    kernel_transform_in_double(f, tile, world, at);
+    *out_x = (float)at[0];
+    *out_y = (float)at[1];
+    *out_z = (float)at[2];
 }
 
 /* Reads the positions of the cell's vertices and transforms them into tile space. They are not put in canonical order,

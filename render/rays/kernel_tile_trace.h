@@ -165,15 +165,6 @@ typedef struct kernel_tile_node {
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
-struct kernel_cell;
-struct kernel_map;
-
-/* Callback that traces a cell, whose data are complete, in the given blocks. If the cell is a polyhedron, only its
- * index is set. map: the map of a hex, wedge or pyramid, to be inverted for reference coordinates (kernel_map.h); NULL
- * if that is not needed. */
-typedef void kernel_tile_trace_cell(kernel_tile_trace *t, int part, const struct kernel_cell *c,
-                                    const struct kernel_map *map, unsigned blocks);
-
 /* Returns the node's placement. Its mask of blocks has those of the given blocks in which the node may be visible. The
  * mask is 0 if the node contains no visible values. visible_values: NULL if all values are visible. */
 SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,

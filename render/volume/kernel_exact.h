@@ -79,26 +79,6 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, double u[SIMD_WID
     }
 }
 
-/* A vertex in tile space in double. On the ray (u, v) it is projected to (x - u * depth, y - v * depth). t: z in tile
- * space; value: the field in the transfer function's domain. */
-typedef struct kernel_double_vertex {
-    double x, y, depth, t, value;
-} kernel_double_vertex;
-
-/* Transforms a vertex from world coordinates to tile space, without its value. */
-SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
-                                                         const double *world)
-{
-    double place[3] = {0, 0, 0};
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) place[a] += f->scaled_axes[a][b] * (world[b] - f->job->camera.eye[b]);
-    const double depth = f->job->camera.is_orthographic ? f->job->space.scale : place[2];
-    return (kernel_double_vertex){.x = place[0] - tile->centre_x * depth,
-                                  .y = place[1] - tile->centre_y * depth,
-                                  .depth = depth,
-                                  .t = place[2] - tile->depth_shift};
-}
-
 /* Maps a value of the field to the transfer function's domain, clamped to [-1e18, 1e18]. */
 static inline double kernel_double_domain(const kernel_transfer *transfer, double value)
 {
@@ -244,10 +224,9 @@ static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const k
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
-        const kernel_double_vertex spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
-        d[0][i] = spot.x;
-        d[1][i] = spot.y;
-        d[2][i] = spot.t;
+        double place[3];
+        kernel_transform_in_double(p->frame, p->tile, c->world[i], place);
+        for (int a = 0; a < 3; a++) d[a][i] = place[a];
         d[3][i] = kernel_double_domain(transfer, c->values[i]);
     }
     for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);

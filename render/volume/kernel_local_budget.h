@@ -49,8 +49,8 @@
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 
 #include "grid.h"
+#include "kernel_bisection.h"
 #include "kernel_cell.h"
-#include "kernel_cell_segments.h"
 #include "kernel_colour.h"
 #include "kernel_integral.h"
 #include "kernel_local_deviation.h"

@@ -76,6 +76,7 @@ typedef struct kernel_tile_cells {
     kernel_local_queue queues[KERNEL_LANE_TYPES];
     kernel_cell cell;                  /* the cell that packets are tracing */
     kernel_map map;                    /* inverse map of that cell */
+    const kernel_map *cell_map;        /* points to that map; NULL if the cell's field is constant */
     kernel_transformed_tets tets;      /* the vector of tets that is being processed */
     kernel_tet_pairs tet_pairs;        /* its tets, paired with rays */
     const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */

@@ -122,22 +122,22 @@ static __attribute__((noinline, cold)) void kernel_local_store_contact(kernel_ti
     }
 }
 
-/* Decides, by the ray's crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and
- * sets its value if it does. lane: the lane of the cell; at: position of the ray among the tile's packets; number: that
- * of the sample in the window. */
-static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t, int lane, int at,
-                                                                             int number)
+/* Sets the values of those of the window's samples begin .. end - 1 that lie in the tile's current cell
+ * (kernel_tile_cells.cell), on the given rays of a packet. */
+static __attribute__((noinline)) void kernel_curved_samples(kernel_tile_trace *t, int packet, vm rays, int begin,
+                                                            int end)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_samples *s = &t->thread->tile_volume->packets[at / SIMD_WIDTH];
+    kernel_packet *p = &t->packets[packet];
+    kernel_samples *s = &t->thread->tile_volume->packets[packet];
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    if (!kernel_tile_make_current(t, lane)) return;
-    const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
-    const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
-    for (int k = 0; k < intervals; k++)
-        kernel_fill_sample_range(p, s, cells->cell.is_constant ? NULL : &cells->map, &list[k], &list[k], number,
-                                 number + 1);
+    const int intervals = kernel_curved_intervals(p, &cells->cell, vm_and(p->active, rays), list);
+    for (int k = 0; k < intervals; k++) {
+        int first, last;
+        kernel_sample_range(p, s, &list[k], &first, &last);
+        kernel_fill_sample_range(p, s, cells->cell_map, &list[k], &list[k], first > begin ? first : begin,
+                                 last < end ? last : end);
+    }
 }
 
 /* Computes the values of a vector of listed samples, from index n on, if they lie inside their cells. */
@@ -167,7 +167,10 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     memcpy(lane, &rays.lane, sizeof lane);
     for (; __builtin_expect(undecided, 0); undecided &= undecided - 1) {
         const int i = __builtin_ctz(undecided);
-        kernel_local_sample_by_crossings(t, lane[i], at[i], number[i]);
+        /* near the cell's border, the ray's crossings of faces decide whether the sample lies in the cell */
+        if (kernel_tile_make_current(t, lane[i]))
+            kernel_curved_samples(t, at[i] / SIMD_WIDTH, vm_from_bits(1u << at[i] % SIMD_WIDTH), number[i],
+                                  number[i] + 1);
     }
 }
 

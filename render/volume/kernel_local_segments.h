@@ -9,8 +9,8 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_bisection.h"
 #include "kernel_cell.h"
-#include "kernel_cell_segments.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
 #include "kernel_local.h"
@@ -262,13 +262,13 @@ static __attribute__((noinline)) void kernel_constant_segments(const kernel_tile
     kernel_linear_segments(t, s, places, i->mask, i, reach, &whole);
 }
 
-/* Adds the segments of a packet's rays in a hex, wedge or pyramid, between the depths reach[0] and reach[1]. share:
- * length between these depths, as a share of the rays' intervals in the cell; map: the cell's inverse map, NULL if the
- * field is constant. */
-static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, const kernel_cell *c,
-                                                             const kernel_map *map, vm rays, const vf reach[2],
-                                                             float share)
+/* Adds the segments of a packet's rays in the tile's current cell (kernel_tile_cells.cell), between the depths reach[0]
+ * and reach[1]. share: length between these depths, as a share of the rays' intervals in the cell. */
+static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, vm rays,
+                                                             const vf reach[2], float share)
 {
+    const kernel_cell *c = &t->thread->tile_cells->cell;
+    const kernel_map *map = t->thread->tile_cells->cell_map;
     kernel_tile_segments *b = t->thread->tile_segments;
     kernel_packet *p = &t->packets[packet];
     kernel_segments *list = &b->packets[packet];
@@ -309,7 +309,6 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
                                                                            unsigned wanted, const vf reach[2],
                                                                            float share)
 {
-    const kernel_tile_cells *cells = t->thread->tile_cells;
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
     float depths[2][SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
@@ -327,8 +326,7 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
             wanted &= ~(1u << i);
         }
         if (!kernel_tile_make_current(t, lane[first])) continue;
-        kernel_curved_segments(t, packet, &cells->cell, cells->cell.is_constant ? NULL : &cells->map,
-                               vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
+        kernel_curved_segments(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
     }
 }
 

@@ -23,6 +23,7 @@
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_polyhedron.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
@@ -30,6 +31,7 @@
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "render.h"
+#include "render_polyhedra.h"
 #include "simd.h"
 
 /* KERNEL_OPEN_PIECE: number of cells between two prefetches; KERNEL_SORT_PIECE: ranges of at most that many candidates
@@ -41,9 +43,9 @@ typedef struct kernel_volume_method {
     /* set if the packets' rays are the tile's own primary rays (kernel_packet.is_pencil), for which cells need edge
      * functions */
     bool is_pencil;
-    /* Processes a cell, which is in tile space, with the rays of the packets of the given blocks. map: its inverse map;
-     * NULL if it needs none. */
-    kernel_tile_trace_cell *take;
+    /* Processes a cell with the rays of the packet with this index: the polyhedron c or, if c is NULL, the tile's
+     * current cell (kernel_tile_cells.cell), a hex, wedge or pyramid. */
+    void (*process_packet)(kernel_tile_trace *t, int packet, const polyhedron *c);
     /* Processes the current vector of tets, paired with rays by kernel_tet_pairs_next(). */
     void (*process_tets)(kernel_tile_trace *t);
     /* Transforms the current vector of cells of this type: hexes, wedges or pyramids. Returns a mask of the visible
@@ -51,7 +53,8 @@ typedef struct kernel_volume_method {
     unsigned (*transform)(kernel_tile_trace *t, int type, unsigned *lanes);
     /* Processes the listed pixels of the current vector of cells, and empties the list. */
     void (*process_pixels)(kernel_tile_trace *t, int type);
-    /* called after all pixels of a vector of cells have been listed and processed */
+    /* called after all pixels of a vector of cells have been listed and processed, and after a cell has been processed
+     * by packets */
     void (*finish)(kernel_tile_trace *t, int type);
 } kernel_volume_method;
 
@@ -254,6 +257,7 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     kernel_cell_map_values_to_domain(c, transfer);
     if (kernel_is_linear(c->type)) return meets;
     if (cells->method->is_pencil) kernel_cell_compute_lines(c, t->frame, &t->tile);
+    cells->cell_map = c->is_constant ? NULL : &cells->map;
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
 }
@@ -273,26 +277,53 @@ static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile
     return true;
 }
 
+/* Returns the polyhedron with this part and index, in tile space and with its values in the transfer function's domain.
+ * NULL if it is invisible or memory ran out. p: any packet of the tile. */
+static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int part, uint32_t index)
+{
+    const kernel_transfer *t = &p->frame->volumes[volume];
+    const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
+    polyhedron *c = kernel_polyhedron_find(p, field, part, p->frame->surface_count + volume, index);
+    if (!c || !kernel_values_are_visible(c->values, c->vertex_count, t)) return NULL;
+    if (!c->is_transformed) {
+        kernel_polyhedron_transform(c, p);
+        for (int i = 0; i <= c->vertex_count; i++)
+            c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
+    }
+    return c;
+}
+
+/* Processes the polyhedron c or, if c is NULL, the tile's current cell by the packets of the given blocks. */
+static void kernel_tile_process_packets(kernel_tile_trace *t, const polyhedron *c, unsigned blocks)
+{
+    const kernel_volume_method *method = t->thread->tile_cells->method;
+    for (; blocks; blocks &= blocks - 1) {
+        const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
+        for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) method->process_packet(t, i, c);
+    }
+    method->finish(t, GRID_NO_TYPE);
+}
+
 /* Reads a cell, transforms it, and processes it in the given blocks: by packets, unless it is a tet. */
 static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace *t, int part, uint32_t index,
                                                                unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_trace_cell *take = cells->method->take;
-    kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
     t->thread->volume_cells++;
-    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
-    if (kernel_has_own_faces(c->type)) {
-        take(t, part, c, NULL, blocks);
+    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
+    if (kernel_has_own_faces(cells->cell.type)) { /* kernel_cell_fetch() makes tets of polyhedra that are tets */
+        kernel_packet *p = &t->packets[__builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS];
+        const polyhedron *c = kernel_polyhedron_prepare(p, cells->volume, part, index);
+        if (c) kernel_tile_process_packets(t, c, blocks);
         return;
     }
     blocks = kernel_tile_transform_cell(t, cells, g, blocks);
     if (!blocks) return;
-    if (kernel_is_linear(c->type))
+    if (kernel_is_linear(cells->cell.type))
         kernel_tile_process_single_tet(t, cells, blocks);
     else
-        take(t, part, c, c->is_constant ? NULL : &cells->map, blocks);
+        kernel_tile_process_packets(t, NULL, blocks);
 }
 
 /* ---- SIMD_WIDTH hexes, wedges or pyramids at once ---- */

@@ -21,13 +21,11 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_cell.h"
-#include "kernel_cell_segments.h"
 #include "kernel_exact.h"
 #include "kernel_local_queue.h"
 #include "kernel_local_segments.h"
-#include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_polyhedron.h"
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
 #include "kernel_segments.h"
@@ -41,17 +39,15 @@
 
 /* ---- cells ---- */
 
-/* Adds the segments of the packet's rays in a polyhedron: the linear pieces of their profiles, on which the field is
- * exactly linear. */
-static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, int part, uint32_t index)
+/* Adds the segments of a packet's rays in a polyhedron, between the depths reach[0] and reach[1]: the linear pieces of
+ * their profiles (kernel_polyhedron.h), on which the field is exactly linear. */
+static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, const polyhedron *c, const vf reach[2])
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    kernel_packet *p = &t->packets[packet];
-    const kernel_segments *list = &s->packets[packet];
-    const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);
+    const kernel_packet *p = &t->packets[packet];
     kernel_poly_crossings r;
     kernel_interval piece;
-    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
+    if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
     while (kernel_poly_next(&r)) {
         if (!c->is_constant) kernel_poly_prepare_profile(&r);
         kernel_profile_begin(&r, &piece);
@@ -60,29 +56,21 @@ static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, int par
             if (!vm_any(piece.mask)) break;
             kernel_profile_next(&r, r.u_out, &piece);
             const kernel_unit_segment whole =
-                kernel_unit_segment_of((piece.t_out - piece.t_in) * list->per_t, piece.v_in, piece.v_out);
-            kernel_linear_segments(t, s, kernel_packet_places(packet), piece.mask, &piece,
-                                   (const vf[2]){p->t_near, list->t_cut}, &whole);
+                kernel_unit_segment_of((piece.t_out - piece.t_in) * s->packets[packet].per_t, piece.v_in, piece.v_out);
+            kernel_linear_segments(t, s, kernel_packet_places(packet), piece.mask, &piece, reach, &whole);
         }
     }
 }
 
-/* Adds the segments of the rays of the given blocks in the cell. */
-static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
-                                      unsigned blocks)
+/* Adds the segments of a packet's rays in the polyhedron c or, if c is NULL, in the tile's current cell. */
+static void kernel_tile_cell_segments(kernel_tile_trace *t, int packet, const polyhedron *c)
 {
-    kernel_tile_segments *s = t->thread->tile_segments;
-    for (unsigned left = blocks; left; left &= left - 1) {
-        const int first = __builtin_ctz(left) * KERNEL_BLOCK_PACKETS;
-        for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
-            kernel_packet *p = &t->packets[i];
-            if (kernel_has_own_faces(c->type))
-                kernel_polyhedron_segments(t, i, part, c->index);
-            else
-                kernel_curved_segments(t, i, c, map, p->active, (const vf[2]){p->t_near, s->packets[i].t_cut}, 1);
-        }
-    }
-    kernel_blocks_shorten(t, blocks);
+    const kernel_packet *p = &t->packets[packet];
+    const vf reach[2] = {p->t_near, t->thread->tile_segments->packets[packet].t_cut};
+    if (c)
+        kernel_polyhedron_segments(t, packet, c, reach);
+    else
+        kernel_curved_segments(t, packet, p->active, reach, 1);
 }
 
 /* ---- tets ---- */
@@ -143,7 +131,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_tile_trace *t)
 
 static const kernel_volume_method kernel_volume_by_segments = {
     .is_pencil = false,
-    .take = kernel_tile_cell_segments,
+    .process_packet = kernel_tile_cell_segments,
     .process_tets = kernel_tet_segments,
     .transform = kernel_local_segments_transform,
     .process_pixels = kernel_local_segments_cast,

@@ -20,12 +20,9 @@
 #include <math.h>
 
 #include "grid.h"
-#include "kernel_cell.h"
-#include "kernel_cell_segments.h"
-#include "kernel_crossings.h"
 #include "kernel_local_samples.h"
-#include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_polyhedron.h"
 #include "kernel_samples.h"
 #include "kernel_tets.h"
 #include "kernel_tile.h"
@@ -38,32 +35,32 @@
 
 /* ---- cells ---- */
 
-/* Sets the values of a packet's samples in a hex, wedge or pyramid. map: its inverse map; NULL if the field is
- * constant. */
-static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_samples *s,
-                                                                 const kernel_cell *c, const kernel_map *map)
+/* Sets the values of the window's samples that lie in the current interval of the rays in a polyhedron, on which the
+ * field is piecewise linear: the ray's profile (kernel_polyhedron.h). */
+static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
 {
-    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    for (int k = 0; k < intervals; k++) kernel_fill_interval_samples(p, s, map, &list[k], &list[k]);
+    const kernel_interval *i = &r->interval;
+    kernel_interval piece;
+    int begin, end;
+    kernel_sample_range(p, s, i, &begin, &end);
+    if (begin >= end) return;
+    if (!r->cell->is_constant) kernel_poly_prepare_profile(r);
+    kernel_profile_begin(r, &piece);
+    while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
+        kernel_profile_next(r, r->u_out, &piece);
+        kernel_fill_interval_samples(p, s, NULL, &piece, i);
+    }
 }
 
-/* Sets the values of the samples in the cell, on the rays of the given blocks. */
-static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
-                                unsigned blocks)
+/* Sets the values of the samples of a packet's rays in the polyhedron c or, if c is NULL, in the tile's current cell.
+ */
+static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedron *c)
 {
-    kernel_tile_volume *v = t->thread->tile_volume;
-    for (; blocks; blocks &= blocks - 1) {
-        const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
-        for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
-            kernel_packet *p = &t->packets[i];
-            kernel_samples *s = &v->packets[i];
-            if (kernel_has_own_faces(c->type))
-                kernel_polyhedron_volume(p, s, part, c->index, p->active);
-            else
-                kernel_tile_curved_samples(p, s, c, map);
-        }
-    }
+    kernel_packet *p = &t->packets[packet];
+    kernel_poly_crossings r;
+    if (!c) kernel_curved_samples(t, packet, p->active, 0, KERNEL_MAX_GROUP);
+    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
+    while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, &t->thread->tile_volume->packets[packet], &r);
 }
 
 /* ---- tets: the results are bit-identical for listed pairs and packets ---- */
@@ -128,7 +125,7 @@ static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
 
 static const kernel_volume_method kernel_volume_by_samples = {
     .is_pencil = true,
-    .take = kernel_tile_samples,
+    .process_packet = kernel_tile_samples,
     .process_tets = kernel_tet_samples,
     .transform = kernel_local_transform_lanes,
     .process_pixels = kernel_local_queue_samples,

@@ -1,45 +1,9 @@
-/* Computes the segments of rays in cells (kernel_segments.h defines the terms): in polyhedra and constant cells, where
- * the field is linear along a ray and only surfaces cut its interval; and, by bisection, in parts of intervals in
- * hexes, wedges and pyramids. */
-#ifndef RENDER_KERNEL_CELL_SEGMENTS_H
-#define RENDER_KERNEL_CELL_SEGMENTS_H
-
-#include <math.h>
-#include <string.h>
-
-#include "grid.h"
-#include "kernel_bound.h"
-#include "kernel_cell.h"
-#include "kernel_cell_values.h"
-#include "kernel_crossings.h"
-#include "kernel_exact.h"
-#include "kernel_integral.h"
-#include "kernel_map.h"
-#include "kernel_packet.h"
-#include "kernel_polyhedron.h"
-#include "kernel_samples.h"
-#include "kernel_segment_list.h"
-#include "kernel_types.h"
-#include "render_polyhedra.h"
-#include "simd.h"
-
-/* Returns the rays for which the opacity has a step at a value from low to high. */
-SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
-{
-    vm any = vm_none();
-    for (int i = 0; i < t->step_count; i++) {
-        const vf cut = vf_set(kernel_step_cut(t->steps[i]));
-        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
-    }
-    return any;
-}
-
-/* Bisection divides those parts of a ray's interval in a cell for which no number of equal segments is accurate enough.
- * At a step of the opacity there is no slope that would bound the effect of a small field error on the light. If a
- * curved field barely reaches the step, the length beyond the step grows with the square root of the excess: at 800
- * optical depths an error of the field of 1e-6 of the transfer function's domain changes such a pixel by a tenth. So
- * the bisection is computed in double, from the caller's coordinates and values and the ray's position in the picture,
- * one ray at a time, and identically for all instruction sets.
+/* Bisects those parts of a ray's interval in a hex, wedge or pyramid for which no number of equal segments is accurate
+ * enough. At a step of the opacity there is no slope that would bound the effect of a small field error on the light.
+ * If a curved field barely reaches the step, the length beyond the step grows with the square root of the excess: at
+ * 800 optical depths an error of the field of 1e-6 of the transfer function's domain changes such a pixel by a tenth.
+ * So the bisection is computed in double, from the caller's coordinates and values and the ray's position in the
+ * picture, one ray at a time, and identically for all instruction sets.
  *
  * Subintervals. The chord of a subinterval is the linear function with the field's values at the two ends. The field is
  * computed at the ends, quarters and middle; its deviation from the chord is taken as at most d, which is 1.5 times the
@@ -66,6 +30,33 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
  * subintervals at an extremum that touches a step, for which no bisection suffices: a subinterval is not divided
  * further if T times its error for any d (from s1 - s0 alone) is at most 1/32 of a (length of the interval / reach). A
  * cubic has two extrema, and four such subintervals use the remaining eighth. */
+#ifndef RENDER_KERNEL_BISECTION_H
+#define RENDER_KERNEL_BISECTION_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_bound.h"
+#include "kernel_cell.h"
+#include "kernel_exact.h"
+#include "kernel_integral.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_segment_list.h"
+#include "kernel_types.h"
+#include "simd.h"
+
+/* Returns the rays for which the opacity has a step at a value from low to high. */
+SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
+{
+    vm any = vm_none();
+    for (int i = 0; i < t->step_count; i++) {
+        const vf cut = vf_set(kernel_step_cut(t->steps[i]));
+        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
+    }
+    return any;
+}
 
 /* KERNEL_BISECTION_DEPTH: maximum number of halvings; 2^-40 of an interval is negligible in any medium.
  * KERNEL_BISECTION_ROOM: size of the stack of subintervals. KERNEL_BISECTION_SEGMENTS: after that many segments the
@@ -403,56 +394,6 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
         sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
         kernel_subinterval_bisect(&h, n, begin, sub);
     }
-}
-
-/* ---- cells in which the field is linear ---- */
-
-/* The following functions compute samples and segments in polyhedra, where the field along a ray is piecewise linear:
- * the ray's profile (kernel_polyhedron.h). */
-
-/* Sets c->f to the values at the vertices and the centre, in the transfer function's domain. */
-SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
-{
-    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
-}
-
-/* Computes the window's samples that lie in the current interval of the rays in a polyhedron. */
-static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
-{
-    const kernel_interval *i = &r->interval;
-    kernel_interval piece;
-    int begin, end;
-    kernel_sample_range(p, s, i, &begin, &end);
-    if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_poly_prepare_profile(r);
-    kernel_profile_begin(r, &piece);
-    while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
-        kernel_profile_next(r, r->u_out, &piece);
-        kernel_fill_interval_samples(p, s, NULL, &piece, i);
-    }
-}
-
-/* Returns the polyhedron with this part and index, in tile space and with its values in the transfer function's domain.
- * NULL if it is invisible or memory ran out. */
-static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int part, uint32_t index)
-{
-    const kernel_transfer *transfer = &p->frame->volumes[volume];
-    const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
-    polyhedron *c = kernel_polyhedron_find(p, field, part, p->frame->surface_count + volume, index);
-    if (!c || !kernel_values_are_visible(c->values, c->vertex_count, transfer)) return NULL;
-    if (!c->is_transformed) {
-        kernel_polyhedron_transform(c, p);
-        kernel_polyhedron_domain(c, transfer);
-    }
-    return c;
-}
-
-static void kernel_polyhedron_volume(kernel_packet *p, kernel_samples *s, int part, uint32_t index, vm rays)
-{
-    const polyhedron *c = kernel_polyhedron_prepare(p, s->volume, part, index);
-    kernel_poly_crossings r;
-    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, s, &r);
 }
 
 #endif
