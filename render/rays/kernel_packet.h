@@ -131,10 +131,12 @@ static inline int kernel_first_sample_number(const kernel_frame *f)
     return count > 0 && count < 1e9 ? -(int)count : 0;
 }
 
-static inline void kernel_packet_set_samples(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
+static inline void kernel_packet_set_samples(kernel_packet *p)
 {
     const kernel_frame *f = p->frame;
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float base[SIMD_WIDTH], step[SIMD_WIDTH];
+    kernel_packet_ray_parameters(p, px, py);
     p->sample_first = kernel_first_sample_number(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const bool flat = f->job->camera.is_orthographic;

@@ -29,7 +29,7 @@ typedef struct kernel_tile_trace {
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
-    float pixel_far[KERNEL_TILE * KERNEL_TILE];
+    float pixel_far[KERNEL_TILE_PIXELS];
     /* The following members describe the surface layer that is being traced. */
     const kernel_surface *surface;
     int layer;
@@ -144,7 +144,7 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);
     if (!f->needs_planes) return;
-    for (int i = 0; i < KERNEL_TILE * KERNEL_TILE; i++) {
+    for (int i = 0; i < KERNEL_TILE_PIXELS; i++) {
         const int column = i % KERNEL_TILE / KERNEL_BLOCK, row = i / KERNEL_TILE / KERNEL_BLOCK;
         t->pixel_far[i] = wanted >> (row * KERNEL_BLOCKS_ACROSS + column) & 1 ? INFINITY : -INFINITY;
     }
@@ -220,7 +220,7 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
 
 /* ---- lists of rays of several cells ---- */
 
-enum { KERNEL_LIST_PIXELS = 512, KERNEL_LIST_ROOM = KERNEL_LIST_PIXELS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
+enum { KERNEL_LIST_PIXELS = 512, KERNEL_LIST_ROOM = KERNEL_LIST_PIXELS + KERNEL_TILE_PIXELS + SIMD_WIDTH };
 
 /* A list of rays, each with its pixel in the tile (16 * row + column) and the lane that holds its cell. */
 typedef struct kernel_pixel_list {

@@ -30,6 +30,7 @@
 
 enum {
     KERNEL_TILE = 16,
+    KERNEL_TILE_PIXELS = KERNEL_TILE * KERNEL_TILE,
     KERNEL_TILES_PER_TASK = 4, /* number of consecutive tiles, row by row, that a thread draws as one task */
     KERNEL_BLOCK = 4,          /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
@@ -328,7 +329,8 @@ typedef struct kernel_frame {
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    /* Limits for segments. allowance: error allowed for the approximation of the field; mixing: error allowed for the
+    /* Limits for segments. allowance: error allowed for the approximation of the field (kernel_local_budget.h), or 0 if
+     * segments of hexes, wedges and pyramids are at most as long as the sampling step; mixing: error allowed for the
      * mixing of overlapping segments; reach: for each volume, upper bound of the length of a ray in the scene, in its
      * unit distances (render_transfer). */
     float allowance, mixing, reach[RENDER_MAX_VOLUMES];

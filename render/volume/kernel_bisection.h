@@ -25,7 +25,7 @@
  * the colours' contrast. A field error of d on average changes the extinction by ds <= s' d, and by at most s1 - s0,
  * and the colour by dc <= c' d. Light in the subinterval falls at least as exp(-s0 t), so that R ds is visible over at
  * most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L, 1), times T. The
- * error may be 7/8 of that which equal segments may have. With a = list->allowance, reach = list->reach (the longest
+ * error may be 7/8 of that which equal segments may have. With the frame's a = allowance and reach (the longest
  * ray, in unit distances) and D = s0 L: T error <= 7/8 a (L / reach + T D / (1 + D)). The remaining eighth is for
  * subintervals at an extremum that touches a step, for which no bisection suffices: a subinterval is not divided
  * further if T times its error for any d (from s1 - s0 alone) is at most 1/32 of a (length of the interval / reach). A
@@ -73,6 +73,7 @@ typedef struct kernel_exact_point {
 
 /* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
+    const kernel_frame *frame;
     kernel_segments *list;
     /* polynomial coefficients of the cell's map (3 rows) and of the field (kernel_exact_setup()) */
     const double (*map)[8];
@@ -306,7 +307,7 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, 
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, bool is_cut)
 {
-    const double reach = (double)h->list->reach, a = (double)h->list->allowance;
+    const double reach = (double)h->frame->reach[h->list->volume], a = (double)h->frame->allowance;
     const double depth = (double)s->extinction_low * length;
     double all;
     const double error = kernel_subinterval_error(h, sub, s, length, &all);
@@ -361,16 +362,17 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
     const kernel_frame *f = p->frame;
     const bool is_flat = f->job->camera.is_orthographic;
     double map[4][8];
-    double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
+    double u[SIMD_WIDTH], v[SIMD_WIDTH];
+    kernel_double_rays_of(p, u, v);
     kernel_exact_setup(map, p, c, &f->volumes[list->volume]);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
-        kernel_bisection h = {.list = list,
+        kernel_bisection h = {.frame = f,
+                              .list = list,
                               .map = (const double(*)[8])map,
                               .is_pyramid = kernel_has_apex(c->type),
-                              .u = px[n] - p->tile->centre_x,
-                              .v = py[n] - p->tile->centre_y,
+                              .u = u[n],
+                              .v = v[n],
                               .slope = is_flat ? 0 : 1,
                               .depth_offset = is_flat ? f->job->space.scale : p->tile->depth_shift,
                               .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},

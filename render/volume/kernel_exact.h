@@ -64,10 +64,8 @@ enum {
     KERNEL_DOUBLE_NUMBERS
 };
 
-/* The faces of one tet per lane, in the order of kernel_tet_face: by face and number, in two halves of the lanes. */
-typedef struct kernel_double_faces {
-    kernel_f64 of[4][KERNEL_DOUBLE_NUMBERS][2];
-} kernel_double_faces;
+/* The numbers of one face of one tet per lane, in two halves of the lanes. */
+typedef kernel_f64 kernel_double_face[KERNEL_DOUBLE_NUMBERS][2];
 
 /* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, double u[SIMD_WIDTH], double v[SIMD_WIDTH])
@@ -105,8 +103,7 @@ SIMD_INLINE void kernel_double_edge(const kernel_double_vertices *a, const kerne
 /* Computes the numbers of one face, for one half of the lanes, from the tets' vertices and edge functions. face: a row
  * of kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
 SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots, const kernel_f64 (*edges)[3],
-                                            const signed char *face, double radius, int half,
-                                            kernel_f64 out[KERNEL_DOUBLE_NUMBERS][2])
+                                            const signed char *face, double radius, int half, kernel_double_face out)
 {
     const kernel_double_vertices *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
     const kernel_f64 *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
@@ -125,7 +122,7 @@ SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots,
 static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_frame *f, const kernel_tile *tile,
                                                                   const kernel_transformed_tets *tets,
                                                                   const kernel_transfer *transfer,
-                                                                  kernel_double_faces *out)
+                                                                  kernel_double_face out[4])
 {
     for (int half = 0; half < 2; half++) {
         kernel_double_vertices spots[4];
@@ -139,7 +136,7 @@ static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_f
             kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
         for (int n = 0; n < 4; n++)
             kernel_double_compute_face(spots, (const kernel_f64(*)[3])edges, kernel_tet_face[n], (double)tile->radius,
-                                       half, out->of[n]);
+                                       half, out[n]);
     }
 }
 
@@ -155,16 +152,16 @@ typedef struct kernel_double_points {
 /* Returns one of the affine functions of each ray's face on the ray (u, v), for one half of the lanes. function:
  * KERNEL_DOUBLE_DEPTH, KERNEL_DOUBLE_VALUE or KERNEL_DOUBLE_WEIGHT; index: of the face's first number in `faces`, in
  * floats. */
-SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_faces *faces, int function, vi index, int half,
+SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_face *faces, int function, vi index, int half,
                                             kernel_f64 u, kernel_f64 v)
 {
     kernel_f64 c[3];
-    for (int n = 0; n < 3; n++) c[n] = vd_gather((const float *)(const void *)faces->of[0][function + n], index, half);
+    for (int n = 0; n < 3; n++) c[n] = vd_gather((const float *)(const void *)faces[0][function + n], index, half);
     return (c[0] + c[1] * u) + c[2] * v;
 }
 
 /* Computes the points of rays in the planes of the faces with the given numbers. lane: lane of each ray's tet. */
-SIMD_INLINE void kernel_double_compute_points(const kernel_double_faces *faces, vi face, vi lane, const kernel_f64 u[2],
+SIMD_INLINE void kernel_double_compute_points(const kernel_double_face *faces, vi face, vi lane, const kernel_f64 u[2],
                                               const kernel_f64 v[2], kernel_double_points *out)
 {
     const vi index = face * (2 * SIMD_WIDTH * KERNEL_DOUBLE_NUMBERS) + 2 * lane;
@@ -175,7 +172,7 @@ SIMD_INLINE void kernel_double_compute_points(const kernel_double_faces *faces, 
         out->t[half] = kernel_double_affine(faces, KERNEL_DOUBLE_DEPTH, index, half, u[half], v[half]) * inverse;
         out->value[half] = kernel_double_affine(faces, KERNEL_DOUBLE_VALUE, index, half, u[half], v[half]) * inverse;
         weight[half] = w * w;
-        least[half] = vd_gather((const float *)(const void *)faces->of[0][KERNEL_DOUBLE_LEAST], index, half);
+        least[half] = vd_gather((const float *)(const void *)faces[0][KERNEL_DOUBLE_LEAST], index, half);
         least[half] *= least[half];
     }
     out->sound = vd_lt(least, weight);
@@ -193,7 +190,7 @@ SIMD_INLINE void kernel_round_doubles(const kernel_f64 value[2], vf *v, vf *rest
 /* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double, on
  * the rays that see none of the two crossed faces edge on. The length is in units of t. lane: lane of each ray's tet;
  * first, second: numbers of the crossed faces; u, v: of the rays. */
-SIMD_INLINE void kernel_double_segments(const kernel_double_faces *faces, vi lane, vi first, vi second,
+SIMD_INLINE void kernel_double_segments(const kernel_double_face *faces, vi lane, vi first, vi second,
                                         const kernel_f64 u[2], const kernel_f64 v[2], kernel_unit_segment *run)
 {
     kernel_double_points a, b;

@@ -58,8 +58,8 @@
 #include "simd.h"
 
 /* An interval is halved up to KERNEL_LOCAL_LEVELS times into parts, each with a polynomial of its own.
- * KERNEL_LOCAL_PIECES: maximum number of segments of a part. KERNEL_LOCAL_PIXELS: number of pixels in a tile. */
-enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
+ * KERNEL_LOCAL_PIECES: maximum number of segments of a part. */
+enum { KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
 /* Length of the shortest parts, as a share of the interval. */
 #define KERNEL_LOCAL_LEAST_SHARE (1.0f / (1 << KERNEL_LOCAL_LEVELS))
 

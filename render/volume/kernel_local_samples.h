@@ -33,7 +33,6 @@
 enum {
     /* maximum number of listed samples */
     KERNEL_LOCAL_SAMPLES = 1024,
-    KERNEL_TILE_PIXELS = KERNEL_TILE * KERNEL_TILE,
     /* Layout of the 32-bit word that describes a listed sample: its pixel in the tile (16 * row + column) begins at bit
      * 0, the lane of its cell at bit KERNEL_LOCAL_LANE, and its number in the window at bit KERNEL_LOCAL_NUMBER. */
     KERNEL_LOCAL_LANE = 8,
@@ -197,19 +196,17 @@ static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, in
 SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_tile_cells *cells, int type, int n)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
-    const int left = cells->rays.count - n;
-    const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi pixel = kernel_load_bytes(cells->rays.pixel + n);
     kernel_lane_rays rays;
     vf base, step, near, far, number, last;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(cells->rays.lane + n));
+    kernel_lane_rays_begin(&rays, t, &cells->rays, n);
     const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
     kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     kernel_local_sample_range(b, base, step, depth + near, vf_min(depth + far, vf_gather(b->far, rays.at)), &number,
                               &last);
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
-    for (vm more = vm_and(active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
+    for (vm more = vm_and(rays.active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
         if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, type);
         const vi whole = vi_from_vf(number);
         const vf place = base + step * vf_from_vi(whole + b->first);

@@ -45,20 +45,20 @@ typedef struct kernel_tile_segments {
     float depth;     /* length of the next window in depth; 0 if it has not been determined yet */
     unsigned blocks; /* blocks of the current window */
     int volume;
-    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances of the transfer function per unit of t, by packet and lane */
-    kernel_local_bounds bounds;       /* error bounds of the current vector of cells */
-    bool is_double;                   /* set if the ends of segments are stored in double */
-    bool has_cuts;                    /* set if transparent surfaces cut segments */
-    bool has_overflowed;              /* set if a ray has more such cuts than kernel_hits stores */
+    float per_t[KERNEL_TILE_PIXELS]; /* unit distances of the transfer function per unit of t, by packet and lane */
+    kernel_local_bounds bounds;      /* error bounds of the current vector of cells */
+    bool is_double;                  /* set if the ends of segments are stored in double */
+    bool has_cuts;                   /* set if transparent surfaces cut segments */
+    bool has_overflowed;             /* set if a ray has more such cuts than kernel_hits stores */
     int list_count[KERNEL_LOCAL_LISTS];
     float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* one word per ray */
     /* For each ray, by packet and lane, depths side by side: begin and end of the ray's window (window), and begin and
      * end of the part of the ray in which segments lie (reach). */
-    float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
+    float window[2 * KERNEL_TILE_PIXELS], reach[2 * KERNEL_TILE_PIXELS];
     /* The following members are set only if is_double is: (u, v) of each ray in double, by packet and lane, relative to
      * the tile's centre; and the faces of the current vector of tets. */
-    double u[KERNEL_LOCAL_PIXELS], v[KERNEL_LOCAL_PIXELS];
-    kernel_double_faces faces;
+    double u[KERNEL_TILE_PIXELS], v[KERNEL_TILE_PIXELS];
+    kernel_double_face faces[4];
 } kernel_tile_segments;
 
 /* ---- surfaces that cut segments ---- */
@@ -434,17 +434,15 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
 SIMD_INLINE void kernel_local_segments_list_met(const kernel_tile_trace *t, const kernel_tile_cells *cells,
                                                 kernel_tile_segments *b, int n)
 {
-    const int left = cells->rays.count - n;
-    const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_load_bytes(cells->rays.pixel + n), lane = kernel_load_bytes(cells->rays.lane + n);
+    const vi pixel = kernel_load_bytes(cells->rays.pixel + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
+    kernel_lane_rays_begin(&rays, t, &cells->rays, n);
     const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
     kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
-    kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
+    kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(rays.active, meets), pixel | rays.lane << KERNEL_LOCAL_CELL);
 }
 
 /* Processes the rays in the list KERNEL_LOCAL_MET: finds the crossed faces, then adds the segments. */
@@ -533,7 +531,7 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_
     b->is_double = f->is_double && !f->job->separate_samples;
     b->has_cuts = f->has_transparent && !f->job->separate_samples;
     b->blocks = blocks;
-    for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
+    for (int i = 0; i < KERNEL_TILE_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
     for (; blocks; blocks &= blocks - 1) {
         const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {

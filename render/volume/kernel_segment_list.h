@@ -42,13 +42,9 @@ typedef struct kernel_segments {
     const kernel_hits *cut;      /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
     int volume;                  /* index of the volume */
     const kernel_pieces *pieces; /* the volume's transfer function */
-    /* error of light that is allowed, times a segment's share of the ray's length or of its absorption
-     * (kernel_local_budget.h); 0: segments of hexes, wedges and pyramids are at most as long as the sampling step */
-    float allowance;
     /* > 0: segments are emitted to be mixed with other volumes (kernel_emit_segment()), with at most this error; 0:
      * they are integrated here */
     float mixing;
-    float reach; /* upper bound of a ray's length in the cells, in unit distances */
     kernel_blend blend;
     vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
     /* Depth at which segments are cut: at an opaque surface. Segments that compositing mixes with other volumes are cut

@@ -614,6 +614,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
         kernel_block_begin(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = block * KERNEL_BLOCK_PACKETS + n;
+            kernel_packet_set_samples(&t->packets[i]);
             if (t->frame->volume_intervals) kernel_packet_clip_volumes(&t->packets[i], t->clip_interval);
             packets[count++] = i;
         }

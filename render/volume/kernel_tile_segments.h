@@ -85,7 +85,7 @@ static __attribute__((noinline)) void kernel_tet_segments_refine(const kernel_ti
         u[half] = vd_gather((const float *)(const void *)s->u, 2 * places, half);
         v[half] = vd_gather((const float *)(const void *)s->v, 2 * places, half);
     }
-    kernel_double_segments(&s->faces, lanes, first, second, u, v, run);
+    kernel_double_segments(s->faces, lanes, first, second, u, v, run);
     run->length *= vf_gather(s->per_t, places);
 }
 
@@ -124,7 +124,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_tile_trace *t)
     kernel_lane_rays r;
     if (s->is_double)
         kernel_double_compute_faces(t->frame, &t->tile, &t->thread->tile_cells->tets, &t->frame->volumes[s->volume],
-                                    &s->faces);
+                                    s->faces);
     while (kernel_tet_pairs_next(t, &r)) kernel_tet_segments_lanes(t, s, &r);
     kernel_blocks_shorten(t, s->blocks);
 }
@@ -145,9 +145,6 @@ static const kernel_volume_method kernel_volume_by_segments = {
 SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
-    double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
-    kernel_packet_set_samples(p, px, py);
     p->is_pencil = false;
     list->active = p->active;
     list->blend = kernel_blend_begin();
@@ -167,10 +164,8 @@ SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list,
     list->per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
     list->volume = volume;
     list->pieces = &f->pieces[volume];
-    list->allowance = f->allowance;
     list->mixing = f->job->separate_samples ? f->mixing : 0;
     list->t_cut = list->mixing > 0 ? p->clip_out : p->t_far;
-    list->reach = f->reach[volume];
 }
 
 /* Deactivates rays that have ended or are dark (have less light left than KERNEL_DARK). Returns the least depth at

@@ -137,9 +137,6 @@ static const kernel_volume_method kernel_volume_by_samples = {
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
                                           int *last)
 {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
-    kernel_packet_set_samples(p, px, py);
     s->active = p->active;
     s->blend = kernel_blend_begin();
     s->overlap_depth = vf_set(INFINITY);
