@@ -2,9 +2,7 @@
  * surfaces are traced before volumes, because opaque hits end the rays. The cells to be traced are the tile's
  * candidates, if they have been found before; otherwise they are found by traversing the trees for this tile. */
 #include "grid.h"
-#include "kernel_arrays.h"
 #include "kernel_bins.h"
-#include "kernel_bounds.h"
 #include "kernel_candidates.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
@@ -43,22 +41,11 @@ static void kernel_prefetched_sort(const kernel_tile_candidate **items, int coun
     }
 }
 
-/* Prefetches the vertices of the cells in m->prefetched, whose connectivity has been prefetched, then queues these
- * cells for tracing. */
+/* Queues the cells in m->prefetched, whose connectivity has been prefetched, for tracing. */
 static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
     kernel_prefetched_sort(items, m->prefetched_count);
-    for (int n = 0; n < m->prefetched_count; n++) {
-        int part;
-        kernel_tile_set_source(t, items[n]->source, &part);
-        if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
-        if (m->layer == t->layer && m->part == part &&
-            kernel_is_traced_in_vectors(m, items[n], kernel_arrays_type(&m->arrays, items[n]->cell)))
-            continue; /* cells that are traced in vectors are prefetched by kernel_tile_queue.h */
-        kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
-                                 items[n]->cell);
-    }
     for (int n = 0; n < m->prefetched_count; n++) {
         int part;
         const int value = kernel_tile_set_source(t, items[n]->source, &part);
@@ -104,10 +91,6 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 /* The memory of one thread, which is used for all tiles of a frame that the thread traces. */
 typedef struct kernel_memory {
     kernel_cell packet_cells[KERNEL_CACHE_CELLS];
-    kernel_cell tile_cell;
-    kernel_curved tile_curved;
-    float curved_at[4][8][SIMD_WIDTH], curved_colours[8][SIMD_WIDTH]; /* memory for tile_curved */
-    kernel_bounds curved_bounds;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -227,9 +210,6 @@ static void begin(kernel_thread *thread)
     thread->tile_volume = &m->volume;
     thread->tile_segments = &m->segments;
     thread->finder = &m->finder;
-    m->tile.cell = &m->tile_cell;
-    m->tile.curved = &m->tile_curved;
-    m->tile_curved = (kernel_curved){.at = m->curved_at, .colours = m->curved_colours, .bounds = &m->curved_bounds};
     m->tile.search = &m->search;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells[i].serial = 0;
     m->segments.depth = 0;

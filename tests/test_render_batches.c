@@ -324,6 +324,80 @@ static void lines_of_batches_match_single_cells(void **state)
     }
 }
 
+/* Adds this number to the indices of all vertices and faces, so that they do not fit in 32 bits. */
+static const int64_t index_shift = 3000000000;
+
+/* Moves an array's address so that an index that is index_shift larger reads the same element. */
+static void shift_array(grid_array *a)
+{
+    a->data = (const char *)((uintptr_t)a->data - (uintptr_t)(index_shift * a->stride));
+}
+
+static void shift_indices(render_fixture *f)
+{
+    grid *g = &f->views[0].cells;
+    g->vertex_count += index_shift;
+    for (int a = 0; a < 3; a++) shift_array(&g->coordinates[a]);
+    shift_array(&f->fields[0].values);
+    g->connectivity.base -= index_shift;
+    g->face_connectivity.base -= index_shift;
+    if (g->face_count) shift_array(&g->face_offsets); /* connectivity contains the indices of faces, too */
+}
+
+/* Sets contour lines and the colour map of a surface to the other field. */
+static void show_other_field(render_fixture *f, const grid_field *other, render_lines *lines)
+{
+    static const double levels[2] = {-0.4, 0.05};
+    static const float white[6] = {1, 1, 1, 1, 1, 1};
+    *lines = (render_lines){.field = {other, f->ranges}, .count = 2, .values = levels, .width = 2, .colours = white};
+    f->surfaces[0].lines = lines;
+    fixture_set_volume(f, 0.3); /* the surface uses the colours of this volume's transfer function */
+    f->job.volume_count = 0;
+    f->surfaces[0].colour_field = lines->field;
+    f->surfaces[0].colour_map = &f->transfer;
+}
+
+static void compare_with_large_indices(test_mesh_kind kind, double share_of_polyhedra, int way)
+{
+    render_fixture f;
+    render_lines lines;
+    test_mesh mesh;
+    test_view other;
+    drawn_frame expected, drawn;
+    test_mesh_make_lattice(kind, 5, way % 2 ? 0.2 : 0, test_linear_field, &mesh);
+    if (share_of_polyhedra > 0) test_mesh_to_polyhedra(&mesh, share_of_polyhedra);
+    test_view_create(&mesh, (test_layout){.is_interleaved = true}, &other);
+    test_mesh_set_values(&mesh, test_wave_field);
+    create_fixture(&f, &mesh, 1, 5, (fixture_camera)(way % (int)CAMERA_COUNT));
+    fixture_add_surface(&f, values, 2, 1);
+    if (way < WAYS)
+        choose_way(&f, way);
+    else
+        show_other_field(&f, &other.field, &lines);
+    fixture_draw(&f, &expected);
+    shift_indices(&f);
+    shift_array(&other.field.values);
+    fixture_draw(&f, &drawn);
+    assert_true(expected.list.count > 100);
+    drawn_frame_assert_same(&expected, &drawn);
+    drawn_frame_free(&expected);
+    drawn_frame_free(&drawn);
+    fixture_free(&f);
+    test_view_free(&other);
+    test_mesh_free(&mesh);
+}
+
+/* Checks meshes whose vertex indices do not fit in 32 bits. Some polyhedra are tets. */
+static void large_indices_give_the_same_picture(void **state)
+{
+    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
+    (void)state;
+    for (size_t kind = 0; kind < sizeof kinds / sizeof *kinds; kind++)
+        for (int way = 0; way <= WAYS; way++) compare_with_large_indices(kinds[kind], 0, way);
+    for (int way = 0; way <= WAYS; way++)
+        if (way != BY_DIFFERENCES) compare_with_large_indices(TEST_MIXED, 0.5, way);
+}
+
 int main(void)
 {
     if (fixture_isa_is_unavailable()) return 77;
@@ -334,6 +408,7 @@ int main(void)
         cmocka_unit_test(hits_at_equal_depth_are_kept),
         cmocka_unit_test(unusual_values_are_handled_one_by_one),
         cmocka_unit_test(lines_of_batches_match_single_cells),
+        cmocka_unit_test(large_indices_give_the_same_picture),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

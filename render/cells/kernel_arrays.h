@@ -2,7 +2,7 @@
  * of one or several cell types. Arrays of float32 or float64 that are small enough are read by gather instructions,
  * others number by number. float32 numbers are compared with each other, and with an isovalue, in float32, others in
  * double; both give the same result. For all other computations numbers are converted to double. Meshes whose vertex or
- * cell indices do not fit in 32 bits are not processed in lanes. */
+ * cell indices do not fit in 32 bits cannot be read in lanes. */
 #ifndef RENDER_KERNEL_ARRAYS_H
 #define RENDER_KERNEL_ARRAYS_H
 
@@ -31,7 +31,7 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 }
 
 typedef struct kernel_arrays {
-    bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
+    bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be read in lanes */
     bool is_narrow;            /* set if the coordinates and the field are float32 and can be read by gathers */
     bool has_narrow_positions; /* set if the coordinates are float32 and can be read by gathers */
     const grid *cells;         /* the mesh part's cells */

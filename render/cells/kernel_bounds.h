@@ -557,8 +557,6 @@ typedef struct kernel_curved {
     float (*at)[8][SIMD_WIDTH];
     float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     kernel_bounds *bounds;
-    /* set if `at` and `bounds` have been computed; for a single cell this is done when they are first needed */
-    bool is_ready;
     /* set if kernel_contraction.h has been tried for these rays already, and could not decide whether they meet the
      * isosurface */
     bool is_contracted;
@@ -582,7 +580,6 @@ static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const 
     kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])out->at, beam, out->bounds);
     out->type = c->type;
     out->lane = 0;
-    out->is_ready = true;
 }
 
 #endif

@@ -51,7 +51,7 @@ typedef struct kernel_transformed_curved {
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which copies one lane's cell. world:
      * coordinates by vertex and axis, in two halves of the lanes; rank: rank in the order of coordinates; vertex: index
-     * in the mesh. */
+     * in kernel_arrays. */
     kernel_f64 world[8][3][2];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;

@@ -19,8 +19,9 @@
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
  * members of kernel_line, by edge; doubt: the largest bound of the tet's edge functions; least: for each face, the
- * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices in the mesh. The caller
- * sets f, the values as the layer needs them, and colours, the values of the colour field, if the layer has one. */
+ * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices in kernel_arrays. The
+ * caller sets f, the values as the layer needs them, and colours, the values of the colour field, if the layer has one.
+ */
 typedef struct kernel_transformed_tets {
     /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
     kernel_f64 world[4][3][2], values[4][2];

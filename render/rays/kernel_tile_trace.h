@@ -33,8 +33,6 @@ typedef struct kernel_tile_trace {
     /* The following members describe the surface layer that is being traced. */
     const kernel_surface *surface;
     int layer;
-    struct kernel_cell *cell;
-    struct kernel_curved *curved;
     struct kernel_tile_search *search;          /* state of the tile's search for cells in trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* packets of all blocks, block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];

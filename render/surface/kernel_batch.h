@@ -35,9 +35,6 @@ typedef struct kernel_batch {
     const kernel_surface_cells *queued; /* the cells that are being traced */
     /* the cells in tile space; f is the field minus the isovalue, times a power of two */
     kernel_transformed_tets tets;
-    /* indices in the mesh of the sorted vertices, by vertex and lane; set only if the layer has a colour field or
-     * contour lines */
-    int64_t vertices[4][SIMD_WIDTH];
     bool is_of_faces; /* copy of the layer's is_of_faces */
     bool is_plain;    /* kernel_tile_hits_are_plain() of the layer */
     bool has_normals; /* set if `normal` is computed */
@@ -53,27 +50,10 @@ typedef struct kernel_batch {
 
 /* ---- lanes are cells ---- */
 
-/* Fetches the cells one by one (kernel_cell_fetch()), because kernel_arrays.h cannot read them in lanes. The remaining
- * lanes get copies of the last cell. */
-static __attribute__((noinline)) void kernel_batch_fetch_singly(const kernel_tile_trace *t, kernel_batch *b,
-                                                                const kernel_surface_cells *queued)
+/* Stores the indices in the mesh part of the sorted vertices of lane n's cell. */
+SIMD_INLINE void kernel_batch_vertices(const kernel_batch *b, int n, int64_t out[4])
 {
-    const int part = queued->part;
-    const grid *cells = t->frame->job->parts[part].cells;
-    kernel_cell c;
-    for (int n = 0; n < SIMD_WIDTH; n++) {
-        const int half = n / KERNEL_HALF, lane = n % KERNEL_HALF;
-        if (n < queued->count) {
-            kernel_cell_fetch(&c, cells, &t->surface->layer->field.fields[part], queued->cell[n]);
-            kernel_cell_transform_in_tile(&c, t->frame, &t->tile, cells);
-        }
-        for (int i = 0; i < 4; i++) {
-            b->vertices[i][n] = c.vertices[i];
-            b->tets.values[i][half][lane] = c.values[i];
-            for (int a = 0; a < 3; a++) b->tets.world[i][a][half][lane] = c.world[i][a];
-        }
-    }
-    kernel_transform_sorted_tets(&b->tets, t->frame, &t->tile, true);
+    for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_index(b->queued, b->tets.vertex[i][n]);
 }
 
 /* Reads the colour field at the vertices of the cells, in the domain of its transfer function. */
@@ -82,7 +62,8 @@ static __attribute__((noinline)) void kernel_batch_fetch_colours(const kernel_ti
     const kernel_surface *s = t->surface;
     for (int n = 0; n < b->queued->count; n++) {
         float own[4];
-        const int64_t vertices[4] = {b->vertices[0][n], b->vertices[1][n], b->vertices[2][n], b->vertices[3][n]};
+        int64_t vertices[4];
+        kernel_batch_vertices(b, n, vertices);
         kernel_read_colour_values(s, b->queued->part, b->queued->cell[n], vertices, 4, own);
         for (int i = 0; i < 4; i++) b->tets.colours[i][n] = own[i];
     }
@@ -93,14 +74,8 @@ static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace
                                                          kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
-    kernel_surface_cells_close(queued);
-    if (queued->is_fetched_singly) {
-        kernel_batch_fetch_singly(t, b, queued);
-    } else {
-        kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count, true);
-        for (int i = 0; (layer->colour_map || layer->lines) && i < 4; i++)
-            for (int n = 0; n < SIMD_WIDTH; n++) b->vertices[i][n] = b->tets.vertex[i][n];
-    }
+    kernel_surface_cells_close(t, queued);
+    kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count, true);
     kernel_lanes_subtract_isovalues(b->tets.values, 4, queued->isovalue, b->tets.f);
     kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])b->tets.world, 4);
     b->queued = queued;
@@ -169,10 +144,9 @@ static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_t
     double world[4][3];
     int64_t vertices[4];
     kernel_tet_line line;
-    for (int i = 0; i < 4; i++) {
-        vertices[i] = b->vertices[i][n];
+    kernel_batch_vertices(b, n, vertices);
+    for (int i = 0; i < 4; i++)
         for (int a = 0; a < 3; a++) world[i][a] = kernel_halves_lane(b->tets.world[i][a], n);
-    }
     kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, b->queued->part, (const double(*)[3])world, vertices,
                                   &line);
     b->line_value[n] = line.value;

@@ -45,9 +45,6 @@
 #include "render.h"
 #include "simd.h"
 
-/* maximum number of pixels in the box of a wedge or pyramid that is traced in a batch, if the mesh has mixed types */
-enum { KERNEL_CURVED_PIXELS = 64 };
-
 typedef struct kernel_curved_batch {
     const kernel_surface_cells *queued;    /* the cells that are being traced */
     kernel_transformed_curved transformed; /* these cells in tile space */
@@ -79,11 +76,8 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
 /* Returns the batch's cells in the form that the functions for rays in cells take. */
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 {
-    return (kernel_curved){.type = h->queued->type,
-                           .at = h->transformed.at,
-                           .colours = h->colours,
-                           .bounds = &h->bounds,
-                           .is_ready = true};
+    return (kernel_curved){
+        .type = h->queued->type, .at = h->transformed.at, .colours = h->colours, .bounds = &h->bounds};
 }
 
 /* ---- single cells of the batch ---- */
@@ -98,7 +92,8 @@ SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kerne
     h->cells[n].part = h->queued->part;
     h->cells[n].index = h->queued->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
-    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
+    for (int i = 0; i < h->cells[n].count; i++)
+        h->cells[n].vertices[i] = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
 }
 
 /* Traces some of the rays from index `first` on in the list `rays` cell by cell; rays with the same cell and packet are
@@ -298,7 +293,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
     const int count = grid_type_vertices(h->queued->type);
     for (int n = 0; n < h->queued->count; n++)
         for (int i = 0; i < count; i++) {
-            const int64_t vertex = h->transformed.vertex[i][n];
+            const int64_t vertex = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
             const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->queued->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
@@ -310,8 +305,10 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
 {
     const grid_field *field = &t->surface->layer->lines->field.fields[h->queued->part];
     for (int n = 0; n < h->queued->count; n++)
-        for (int i = 0; i < grid_type_vertices(h->queued->type); i++)
-            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
+        for (int i = 0; i < grid_type_vertices(h->queued->type); i++) {
+            const int64_t vertex = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
+            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, vertex);
+        }
 }
 
 /* Accepts plain hits of one vector of rays (kernel_ray_accept()) with the colours of their isovalues. */
@@ -527,7 +524,7 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
-    kernel_surface_cells_close(queued);
+    kernel_surface_cells_close(t, queued);
     h->queued = queued;
     const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
                                                  queued->isovalue, queued->type);
@@ -538,9 +535,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->copied_lanes = 0;
-    kernel_curved *const alone = t->curved;
     kernel_curved cells = kernel_curved_batch_cells(h);
-    t->curved = &cells;
     for (int n = 0; n < queued->count; n++) {
         const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
         if (!blocks) continue;
@@ -551,9 +546,8 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
         kernel_curved_batch_set_bounds(t, h);
         kernel_curved_batch_copy_cell(t, h, n);
         cells.lane = n;
-        kernel_blocks_trace(t, blocks, h->queued->part, queued->cell[n], &h->cells[n], queued->value[n]);
+        kernel_blocks_trace(t, blocks, queued->part, queued->cell[n], &h->cells[n], &cells, queued->value[n]);
     }
-    t->curved = alone;
 }
 
 /* Traces the queue's cells, which become the current batch, and empties the queue. */

@@ -99,12 +99,14 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     kernel_bounds bounds;
     kernel_curved curved = {.at = at, .colours = colours, .bounds = &bounds};
     const int count = kernel_curved_intervals(p, c, rays, list);
+    bool has_bounds = false;
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(kernel_interval_overlaps_ray(p, i), nonempty);
         if (!vm_any(wanted)) continue;
-        if (!curved.is_ready) kernel_curved_single_bounds(c, &beam, &curved);
+        if (!has_bounds) kernel_curved_single_bounds(c, &beam, &curved);
+        has_bounds = true;
         kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }

@@ -255,8 +255,8 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
 /* Traces one isovalue's surface in a hex, wedge or pyramid with finite values, which must have been transformed into
  * tile space. value: index of the isovalue in the layer. */
 static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, const kernel_surface *s,
-                                                            const kernel_cell *c, kernel_curved *curved, int value,
-                                                            vm rays)
+                                                            const kernel_cell *c, const kernel_curved *curved,
+                                                            int value, vm rays)
 {
     const render_surface_layer *layer = s->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -272,10 +272,6 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
         any = vm_or(any, reached[n]);
     }
     if (!vm_any(any)) return;
-    if (!curved->is_ready) {
-        const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-        kernel_curved_single_bounds(c, &beam, curved);
-    }
     if (!curved->is_contracted) known = kernel_curved_accept_contracted(p, s, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
@@ -684,32 +680,28 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s
 
 /* ---- the blocks of a tile that a cell may meet ---- */
 
-/* Traces a cell with the rays of a block (a square of 4 × 4 pixels). cell: the cell in tile space; NULL for the
- * polyhedron with this part and index, for which all isovalues of the layer are traced. value: index of the isovalue.
- */
-SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
-                                    int value)
+/* Traces a cell with the rays of each of the given blocks (squares of 4 × 4 pixels). cell, curved: a hex, wedge or
+ * pyramid in tile space, of which the surface of the isovalue with index `value` is traced; NULL for the polyhedron
+ * with this part and index, in which all isovalues of the layer are traced. */
+static __attribute__((noinline)) void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part,
+                                                          uint32_t index, const kernel_cell *cell,
+                                                          const kernel_curved *curved, int value)
 {
-    bool is_nearer = false;
-    kernel_block_begin(t, block);
-    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-        const int i = block * KERNEL_BLOCK_PACKETS + n;
-        kernel_packet *p = &t->packets[i];
-        p->is_nearer = false;
-        if (cell)
-            kernel_curved_surface(p, t->surface, cell, t->curved, value, p->active);
-        else
-            kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
-        is_nearer = is_nearer || p->is_nearer;
+    for (; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        bool is_nearer = false;
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            kernel_packet *p = &t->packets[block * KERNEL_BLOCK_PACKETS + n];
+            p->is_nearer = false;
+            if (cell)
+                kernel_curved_surface(p, t->surface, cell, curved, value, p->active);
+            else
+                kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
+            is_nearer = is_nearer || p->is_nearer;
+        }
+        if (is_nearer) kernel_block_update_far(t, block);
     }
-    if (is_nearer) kernel_block_update_far(t, block);
-}
-
-/* Traces a cell with the rays of each of the given blocks (kernel_block_trace()). */
-SIMD_INLINE void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
-                                     const kernel_cell *cell, int value)
-{
-    for (; blocks; blocks &= blocks - 1) kernel_block_trace(t, __builtin_ctz(blocks), part, index, cell, value);
 }
 
 #endif

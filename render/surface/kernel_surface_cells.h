@@ -10,12 +10,9 @@
 #include "simd.h"
 
 typedef struct kernel_surface_cells {
-    int type, count;      /* type of the cells; number of queued cells */
-    int layer, part;      /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
-    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
-    /* Set for tets that the batch reads by kernel_cell_fetch(): polyhedra that are tets, and tets whose vertex indices
-     * do not fit in 32 bits. `vertex` is then not set. */
-    bool is_fetched_singly;
+    int type, count;           /* type of the cells; number of queued cells */
+    int layer, part;           /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
+    kernel_arrays arrays;      /* arrays of the layer's field on the mesh part, or of its copies in `copied` */
     uint32_t cell[SIMD_WIDTH]; /* index of the cell in the mesh part */
     /* copies of the members of kernel_tile_candidate: the blocks and the box of pixels that the cell may meet, and its
      * least depth */
@@ -25,13 +22,52 @@ typedef struct kernel_surface_cells {
     /* reach of hits in the cell (kernel_difference_sample_distance()); set only if normals come from differences */
     float reach[SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
-    int32_t vertex[8][SIMD_WIDTH]; /* indices of the vertices in the mesh part, by vertex and lane */
+    /* by vertex and lane: index of the vertex in `arrays` (kernel_surface_cells_index()) */
+    int32_t vertex[8][SIMD_WIDTH];
+    /* The following members are used only if the mesh part's indices do not fit in 32 bits. index: indices of the
+     * vertices in the mesh part, by vertex and lane; copied: their three coordinates and their values. */
+    int64_t index[8 * SIMD_WIDTH];
+    double copied[4][8 * SIMD_WIDTH];
 } kernel_surface_cells;
 
+/* Sets the layer and the mesh part of the cells that are queued next; the queue must be empty. If the part's indices do
+ * not fit in 32 bits, the queue's arrays become those of its own copies. */
+static inline void kernel_surface_cells_set_part(kernel_surface_cells *own, int layer, int part,
+                                                 const kernel_arrays *arrays)
+{
+    own->layer = layer;
+    own->part = part;
+    own->arrays = *arrays;
+    for (int n = 0; !arrays->has_lanes && n < 4; n++) {
+        const grid_array copy = {.data = (const char *)own->copied[n], .stride = sizeof(double), .is_wide = true};
+        *(n < 3 ? &own->arrays.coordinates[n] : &own->arrays.values) = kernel_numbers_of(&copy, 8 * SIMD_WIDTH);
+    }
+}
+
+/* Returns the index in the mesh part of a vertex with the given index in the queue's arrays. */
+SIMD_INLINE int64_t kernel_surface_cells_index(const kernel_surface_cells *own, int32_t vertex)
+{
+    return own->arrays.has_lanes ? vertex : own->index[vertex];
+}
+
+/* Stores the vertices of the cell in lane n from their indices in the mesh part, and prefetches their coordinates and
+ * values. */
+static __attribute__((noinline)) void kernel_surface_cells_set_vertices(kernel_surface_cells *own, int n,
+                                                                        const int64_t *vertices)
+{
+    for (int i = 0; i < grid_type_vertices(own->type); i++) {
+        const int at = i * SIMD_WIDTH + n;
+        own->vertex[i][n] = own->arrays.has_lanes ? (int32_t)vertices[i] : at;
+        own->index[at] = vertices[i];
+        for (int k = 0; k < 4; k++)
+            __builtin_prefetch(own->arrays.prefetched[k].data + vertices[i] * own->arrays.prefetched[k].stride);
+    }
+}
+
 /* Adds a cell that the current layer's surface crosses; the queue must not be full. value: index of the isovalue in the
- * layer. */
+ * layer; vertices: indices of the cell's vertices in the mesh part, or NULL if kernel_arrays.h can read them. */
 SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_surface_cells *own,
-                                          const kernel_tile_candidate *candidate, int value)
+                                          const kernel_tile_candidate *candidate, int value, const int64_t *vertices)
 {
     const int n = own->count++;
     own->cell[n] = candidate->cell;
@@ -40,14 +76,31 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
     own->near[n] = candidate->near;
     own->value[n] = value;
     own->isovalue[n] = t->surface->layer->values[value];
-    if (own->is_fetched_singly) return;
-    kernel_arrays_vertices_of_any(&own->arrays, candidate->cell, grid_type_vertices(own->type), own->vertex[0] + n,
-                                  SIMD_WIDTH);
+    if (__builtin_expect(vertices != NULL, 0))
+        kernel_surface_cells_set_vertices(own, n, vertices);
+    else
+        kernel_arrays_vertices_of_any(&own->arrays, candidate->cell, grid_type_vertices(own->type), own->vertex[0] + n,
+                                      SIMD_WIDTH);
 }
 
-/* Fills the unused lanes with the vertices and the isovalue of the first cell, so that all lanes can be transformed. */
-SIMD_INLINE void kernel_surface_cells_close(kernel_surface_cells *own)
+/* Copies the coordinates and values of the cells' vertices. */
+static __attribute__((noinline)) void kernel_surface_cells_copy(const kernel_tile_trace *t, kernel_surface_cells *own)
 {
+    const grid_field *field = &t->surface->layer->field.fields[own->part];
+    for (int i = 0; i < grid_type_vertices(own->type); i++)
+        for (int at = i * SIMD_WIDTH; at < i * SIMD_WIDTH + own->count; at++) {
+            double world[3];
+            grid_vertex(own->arrays.cells, own->index[at], world);
+            for (int a = 0; a < 3; a++) own->copied[a][at] = world[a];
+            own->copied[3][at] = grid_field_value(field, own->index[at]);
+        }
+}
+
+/* Completes the data of the queued cells. Fills the unused lanes with the vertices and the isovalue of the first cell,
+ * so that all lanes can be transformed. */
+SIMD_INLINE void kernel_surface_cells_close(const kernel_tile_trace *t, kernel_surface_cells *own)
+{
+    if (__builtin_expect(!own->arrays.has_lanes, 0)) kernel_surface_cells_copy(t, own);
     for (int n = own->count; n < SIMD_WIDTH; n++) {
         for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
         own->isovalue[n] = own->isovalue[0];
