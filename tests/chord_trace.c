@@ -52,7 +52,7 @@ static void chord_tet_interval(const kernel_packet *p, const kernel_cell *c, vm 
     kernel_transformed_tets tet;
     kernel_transform_single_tet(&tet, c, p->frame, p->tile, p->is_pencil);
     for (int i = 0; i < 4; i++) tet.f[i] = vf_set(0);
-    kernel_tet_rays_interval_in_one(&tet, &r, 0, p->is_pencil, out);
+    kernel_tet_rays_interval_in_one(&tet, &r, 0, p->is_pencil, false, out);
 }
 
 static void chord_trace_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part,

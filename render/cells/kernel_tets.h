@@ -142,12 +142,13 @@ SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_
     ends[1] = kernel_sums_select(hit[3], &sums[3], &b);
 }
 
-/* kernel_tets_first_face() returns the number of the face that kernel_tets_select_crossed_faces() selects for ends[0],
- * kernel_tets_second_face() that for ends[1]. */
+/* Returns the index of the face whose sums kernel_tets_select_crossed_faces() selects for ends[0]. */
 SIMD_INLINE vi kernel_tets_first_face(const vm hit[4])
 {
     return vi_select(hit[0], vi_set(0), vi_select(hit[1], vi_set(1), vi_set(2)));
 }
+
+/* Returns the index of the face whose sums kernel_tets_select_crossed_faces() selects for ends[1]. */
 SIMD_INLINE vi kernel_tets_second_face(const vm hit[4])
 {
     return vi_select(hit[3], vi_set(3), vi_select(hit[2], vi_set(2), vi_set(1)));
@@ -249,14 +250,13 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transfo
     kernel_tet_rays_cross(transformed, r, true, has_colour, hit, out);
 }
 
-/* Does the same as kernel_tet_rays_interval() without colours, for rays that all have the tet in the given lane.
- * is_pencil: as above. */
+/* Does the same as kernel_tet_rays_interval() for rays that all have the tet in the given lane. is_pencil: as above. */
 SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
-                                                 int lane, bool is_pencil, kernel_interval *out)
+                                                 int lane, bool is_pencil, bool has_colour, kernel_interval *out)
 {
     const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = true, .lane = lane};
     vm hit[4];
-    kernel_tets_interval(&tets, r->active, is_pencil, false, hit, out);
+    kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
 }
 
 #endif

@@ -36,7 +36,7 @@ typedef struct kernel_batch {
     /* the cells in tile space; f is the field minus the isovalue, times a power of two */
     kernel_transformed_tets tets;
     bool is_of_faces; /* copy of the layer's is_of_faces */
-    bool is_plain;    /* kernel_tile_hits_are_plain() of the layer */
+    bool is_plain;    /* set if hits only need the colours of their isovalues (kernel_tile_hits_are_plain()) */
     bool has_normals; /* set if `normal` is computed */
     vf normal[3];     /* a vector along the gradient in each cell, of any length, in camera axes */
     /* the contour lines' field in each lane's cell (members of kernel_tet_line); valid in the lanes whose bits are set
@@ -117,13 +117,17 @@ static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch 
 
 /* ---- lanes are pixels ---- */
 
-/* Returns the rays that hit the surface in their cells where they are visible. *depth: depths of the hits; has_colour:
- * set if *w, the values of the colour field at the hits, are computed, too. */
+/* Returns the rays that hit the surface in their cells where they are visible. is_whole: set if the rays are a whole
+ * packet, which has one cell; *depth: depths of the hits; has_colour: set if *w, the values of the colour field at the
+ * hits, are computed, too. */
 SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_batch *b, const kernel_lane_rays *r,
-                                      bool has_colour, vf *depth, vf *w)
+                                      bool is_whole, bool has_colour, vf *depth, vf *w)
 {
     kernel_interval i;
-    kernel_tet_rays_interval(&b->tets, r, has_colour, &i);
+    if (is_whole)
+        kernel_tet_rays_interval_in_one(&b->tets, r, r->lane[0], true, has_colour, &i);
+    else
+        kernel_tet_rays_interval(&b->tets, r, has_colour, &i);
     if (!vm_any(i.mask)) return i.mask;
     const vf v_out = kernel_end_in_cell(i.v_in, i.v_out, b->is_of_faces);
     const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, r->far), vf_le(kernel_lane_rays_near(t, r), i.t_out)));
@@ -245,9 +249,9 @@ SIMD_INLINE void kernel_batch_trace_rays(kernel_tile_trace *t, kernel_batch *b, 
         vf depth, w = vf_set(0);
         kernel_batch_load(t, b, first, &r);
         if (!vm_any(r.active)) continue;
-        const vm hit = kernel_batch_find_hits(t, b, &r, has_colour, &depth, &w);
-        if (!vm_any(hit)) continue;
         const bool is_whole = first < b->whole_count;
+        const vm hit = kernel_batch_find_hits(t, b, &r, is_whole, has_colour, &depth, &w);
+        if (!vm_any(hit)) continue;
         if (!has_colour && b->is_plain && !is_whole) {
             nearer |= kernel_batch_accept_plain(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
         } else {

@@ -62,7 +62,7 @@ SIMD_INLINE void kernel_probe_tet_interval(const kernel_packet *p, const kernel_
     const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays};
     kernel_transformed_tets tet;
     kernel_transformed_tets_set(&tet, c);
-    kernel_tet_rays_interval_in_one(&tet, &r, 0, false, out);
+    kernel_tet_rays_interval_in_one(&tet, &r, 0, false, false, out);
 }
 
 /* Takes the sample in the cell c on those of the given rays whose sample point lies in it. A ray that already has a

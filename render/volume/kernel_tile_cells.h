@@ -312,7 +312,8 @@ static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace
     const grid *g = t->frame->job->parts[part].cells;
     t->thread->volume_cells++;
     kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
-    if (kernel_has_own_faces(cells->cell.type)) { /* kernel_cell_fetch() makes tets of polyhedra that are tets */
+    /* the type of a polyhedron that is a tet is now GRID_TET (kernel_cell_fetch()) */
+    if (kernel_has_own_faces(cells->cell.type)) {
         kernel_packet *p = &t->packets[__builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS];
         const polyhedron *c = kernel_polyhedron_prepare(p, cells->volume, part, index);
         if (c) kernel_tile_process_packets(t, c, blocks);

@@ -115,7 +115,7 @@ static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
             kernel_tet_rays_interval(&cells->tets, &r, false, &i);
             if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, r.at);
         } else if (vm_any(r.active)) {
-            kernel_tet_rays_interval_in_one(&cells->tets, &r, cells->tet_pairs.lane, true, &i);
+            kernel_tet_rays_interval_in_one(&cells->tets, &r, cells->tet_pairs.lane, true, false, &i);
             if (!vm_any(i.mask)) continue;
             const kernel_interval own = i; /* not `i`, which would then be kept in memory for listed pairs, too */
             kernel_fill_interval_samples(&t->packets[packet], &b->packets[packet], NULL, &own, &own);
