@@ -205,9 +205,9 @@ static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_
     KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
 }
 
-/* Adds the rays that cross exactly two faces of their cells once each to the list `met`, and the numbers of these faces
- * to `faces`. Rays for which that is not certain are traced cell by cell. Returns a mask of the blocks that contain a
- * ray whose hit is nearer than its previous one. */
+/* Adds the rays that cross exactly two faces of their cells once each to the list `met`, and the indices of these faces
+ * to `faces`. Rays for which that is not certain are traced at once, cell by cell, and their hits are accepted. Returns
+ * a mask of the tile's blocks in which one of these hits is nearer than the ray's previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;

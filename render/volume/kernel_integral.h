@@ -140,7 +140,8 @@ SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_ind
     return vf_gather(t->pieces[0] + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
-/* Reads the values at the two ends of the rays' pieces, and their rounding errors. */
+/* Reads, into *at, the values at which each ray's piece of the transfer function begins and ends, and the rounding
+ * errors of these values. */
 SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_index *at)
 {
     at->low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW);
