@@ -295,7 +295,7 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
     unsigned small = 0;
     kernel_batch_begin(t, b, queued);
     for (int n = 0; n < queued->count; n++) {
-        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
+        const unsigned blocks = kernel_surface_cells_visible_blocks(t, queued, n);
         if (!blocks) continue;
         if (2 * KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 3 * kernel_box_pixels(queued->box[n]))
             kernel_batch_list_rays(t, b, n, blocks, true);

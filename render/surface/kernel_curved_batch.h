@@ -537,7 +537,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     h->copied_lanes = 0;
     kernel_curved cells = kernel_curved_batch_cells(h);
     for (int n = 0; n < queued->count; n++) {
-        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
+        const unsigned blocks = kernel_surface_cells_visible_blocks(t, queued, n);
         if (!blocks) continue;
         if (!(vm_bits(collapsed) >> n & 1)) {
             kernel_curved_batch_list_rays(t, h, n, queued->box[n], queued->blocks[n]);

@@ -96,6 +96,14 @@ static __attribute__((noinline)) void kernel_surface_cells_copy(const kernel_til
         }
 }
 
+/* Returns the blocks in which the cell in lane n may be visible: traced blocks that it may meet, with a ray that has no
+ * nearer hit. */
+SIMD_INLINE unsigned kernel_surface_cells_visible_blocks(const kernel_tile_trace *t, const kernel_surface_cells *own,
+                                                         int n)
+{
+    return own->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, own->near[n]);
+}
+
 /* Completes the data of the queued cells. Fills the unused lanes with the vertices and the isovalue of the first cell,
  * so that all lanes can be transformed. */
 SIMD_INLINE void kernel_surface_cells_close(const kernel_tile_trace *t, kernel_surface_cells *own)
