@@ -55,6 +55,15 @@ SIMD_INLINE vi vi_set(int32_t x)
     return (vi){0} + x;
 }
 
+/* Returns the vector of lane numbers: 0, 1, 2 and so on. */
+SIMD_INLINE vi vi_lanes(void)
+{
+    static const int32_t numbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    vi v;
+    memcpy(&v, numbers, sizeof v);
+    return v;
+}
+
 SIMD_INLINE vf vf_load(const float *p)
 {
     vf v;

@@ -3,6 +3,7 @@
 #define RENDER_KERNEL_COLOUR_H
 
 #include <math.h>
+#include <string.h>
 
 #include "fragment.h"
 #include "kernel_exponentials.h"
@@ -181,21 +182,18 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
         p->thread->out_of_memory = true;
         return;
     }
-    float a[7][SIMD_WIDTH];
-    vf_store(a[0], f->t_in);
-    vf_store(a[1], f->t_out);
-    for (int i = 0; i < 3; i++) vf_store(a[2 + i], f->colour[i]);
-    vf_store(a[5], f->transmittance);
-    vf_store(a[6], f->kind);
-    while (bits) {
-        const int lane = __builtin_ctz(bits);
-        bits &= bits - 1;
-        list->items[list->count++] = (fragment){.pixel = p->pixel[lane],
-                                                .t_in = a[0][lane],
-                                                .t_out = a[1][lane],
-                                                .colour = {a[2][lane], a[3][lane], a[4][lane]},
-                                                .transmittance = a[5][lane],
-                                                .kind = kind + (uint32_t)a[6][lane]};
+    _Static_assert(sizeof(fragment) == 8 * sizeof(float), "a fragment has the eight members below");
+    const vi kinds = vi_from_vf(f->kind) + (int32_t)kind;
+    vf first[4] = {vf_load((const float *)(const void *)p->pixel), f->t_in, f->t_out, f->colour[0]};
+    vf second[4] = {f->colour[1], f->colour[2], f->transmittance, vf_from_bits(kinds)};
+    vf_transpose(first);
+    vf_transpose(second);
+    /* now vector i % 4 holds the four numbers of ray i from lane i / 4 * 4 on */
+    for (; bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        char *item = (char *)&list->items[list->count++];
+        memcpy(item, (const float *)&first[i % 4] + i / 4 * 4, 4 * sizeof(float));
+        memcpy(item + 4 * sizeof(float), (const float *)&second[i % 4] + i / 4 * 4, 4 * sizeof(float));
     }
 }
 

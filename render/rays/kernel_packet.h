@@ -4,6 +4,7 @@
 #define RENDER_KERNEL_PACKET_H
 
 #include <math.h>
+#include <string.h>
 
 #include "kernel_clip.h"
 #include "kernel_hits.h"
@@ -77,26 +78,42 @@ static inline void kernel_packet_ray_parameters(const kernel_packet *p, double p
     }
 }
 
+/* Returns entries[index] for each lane. entries: one number for each column, or for each row, of the tile. */
+SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi index)
+{
+    return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
+}
+
 /* Sets the rays of the packet whose upper left pixel is (x0, y0), and their pixels' columns and rows. */
 static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
 {
     const kernel_tile *tile = p->tile;
-    const int column = x0 - tile->x0, row = y0 - tile->y0;
-    float lanes[4][SIMD_WIDTH];
-    for (int i = 0; i < SIMD_WIDTH; i++) {
-        lanes[0][i] = tile->origin_x[column + i % KERNEL_PACKET_COLUMNS];
-        lanes[1][i] = tile->slope_x[column + i % KERNEL_PACKET_COLUMNS];
-        lanes[2][i] = tile->origin_y[row + i / KERNEL_PACKET_COLUMNS];
-        lanes[3][i] = tile->slope_y[row + i / KERNEL_PACKET_COLUMNS];
-        p->column[i] = i % KERNEL_PACKET_COLUMNS;
-        p->row[i] = i / KERNEL_PACKET_COLUMNS;
-    }
-    p->column += x0;
-    p->row += y0;
-    p->origin_x = vf_load(lanes[0]);
-    p->slope_x = vf_load(lanes[1]);
-    p->origin_y = vf_load(lanes[2]);
-    p->slope_y = vf_load(lanes[3]);
+    const vi column = vi_lanes() & (KERNEL_PACKET_COLUMNS - 1), row = vi_lanes() / KERNEL_PACKET_COLUMNS;
+    const vi tile_column = column + (x0 - tile->x0), tile_row = row + (y0 - tile->y0);
+    p->column = column + x0;
+    p->row = row + y0;
+    p->origin_x = kernel_gather_tile_numbers(tile->origin_x, tile_column);
+    p->slope_x = kernel_gather_tile_numbers(tile->slope_x, tile_column);
+    p->origin_y = kernel_gather_tile_numbers(tile->origin_y, tile_row);
+    p->slope_y = kernel_gather_tile_numbers(tile->slope_y, tile_row);
+}
+
+/* Sets the indices of the packet's pixels in the image, and deactivates rays whose pixels lie outside the image or are
+ * not traced. */
+static inline void kernel_packet_pixels(kernel_packet *p, int x0, int y0)
+{
+    typedef uint32_t kernel_lane_pixels __attribute__((vector_size(SIMD_WIDTH * 4)));
+    const render_job *job = p->frame->job;
+    const int columns = job->camera.width - x0, rows = job->camera.height - y0;
+    const int inside = columns < 0 ? 0 : columns < KERNEL_PACKET_COLUMNS ? columns : KERNEL_PACKET_COLUMNS;
+    const kernel_lane_pixels pixels =
+        (kernel_lane_pixels)p->row * (uint32_t)job->camera.width + (kernel_lane_pixels)p->column;
+    unsigned bits = 0;
+    memcpy(p->pixel, &pixels, sizeof pixels);
+    for (int y = 0; y < KERNEL_PACKET_ROWS && y < rows; y++) bits |= ((1u << inside) - 1) << y * KERNEL_PACKET_COLUMNS;
+    for (int lane = 0; job->pixels && lane < SIMD_WIDTH; lane++)
+        if (bits >> lane & 1 && !pixel_set_has(job->pixels, p->pixel[lane])) bits &= ~(1u << lane);
+    p->active = vm_from_bits(bits);
 }
 
 /* Computes the directions from the scene to the eye (p->view) unless they are already set; kernel_shade() needs
@@ -104,8 +121,8 @@ static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
 static inline void kernel_packet_set_view(kernel_packet *p)
 {
     if (p->has_view) return;
-    double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
-    float view[3][SIMD_WIDTH];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    float square[SIMD_WIDTH], x[SIMD_WIDTH], y[SIMD_WIDTH];
     p->has_view = true;
     if (p->frame->job->camera.is_orthographic) {
         p->view[0] = p->view[1] = vf_set(0);
@@ -113,13 +130,14 @@ static inline void kernel_packet_set_view(kernel_packet *p)
         return;
     }
     kernel_packet_ray_parameters(p, px, py);
-    for (int i = 0; i < SIMD_WIDTH; i++) inverse[i] = 1 / sqrt(1 + px[i] * px[i] + py[i] * py[i]);
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        view[0][i] = (float)(-px[i] * inverse[i]);
-        view[1][i] = (float)(-py[i] * inverse[i]);
-        view[2][i] = (float)-inverse[i];
+        square[i] = (float)(1 + px[i] * px[i] + py[i] * py[i]);
+        x[i] = (float)px[i];
+        y[i] = (float)py[i];
     }
-    for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
+    p->view[2] = -1.0f / vf_sqrt(vf_load(square));
+    p->view[0] = vf_load(x) * p->view[2];
+    p->view[1] = vf_load(y) * p->view[2];
 }
 
 /* Returns the index of the first sample on a ray, the one next to the eye. The index is 0 or negative. Sample 0 is near
@@ -205,25 +223,16 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
-    const render_camera *camera = &f->job->camera;
-    unsigned bits = 0;
+    const bool is_orthographic = f->job->camera.is_orthographic;
     p->frame = f;
     p->tile = tile;
     p->thread = thread;
     p->has_view = p->is_nearer = false;
-    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-        const int x = x0 + lane % KERNEL_PACKET_COLUMNS, y = y0 + lane / KERNEL_PACKET_COLUMNS;
-        const bool is_inside = x < camera->width && y < camera->height;
-        p->pixel[lane] = (uint32_t)y * (uint32_t)camera->width + (uint32_t)x;
-        bits |= (unsigned)is_inside << lane;
-    }
-    for (int lane = 0; f->job->pixels && lane < SIMD_WIDTH; lane++)
-        if (bits >> lane & 1 && !pixel_set_has(f->job->pixels, p->pixel[lane])) bits &= ~(1u << lane);
-    p->active = vm_from_bits(bits);
     kernel_packet_tile_rays(p, x0, y0);
+    kernel_packet_pixels(p, x0, y0);
     p->is_pencil = true;
-    p->u = camera->is_orthographic ? p->origin_x : p->slope_x;
-    p->v = camera->is_orthographic ? p->origin_y : p->slope_y;
+    p->u = is_orthographic ? p->origin_x : p->slope_x;
+    p->v = is_orthographic ? p->origin_y : p->slope_y;
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
     if (f->volume_count) {

@@ -285,12 +285,6 @@ SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Returns entries[index] for each lane. entries: one number for each column, or for each row, of the tile. */
-SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi index)
-{
-    return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
-}
-
 /* Returns the position of a pixel among the tile's packets, which is packet * SIMD_WIDTH + lane. */
 SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
 {
@@ -368,10 +362,7 @@ SIMD_INLINE int kernel_packet_of_pixel(int pixel)
 /* Returns the positions of a packet's rays among the tile's packets. */
 SIMD_INLINE vi kernel_packet_places(int packet)
 {
-    static const int32_t ramp[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    vi lanes;
-    memcpy(&lanes, ramp, sizeof lanes);
-    return packet * SIMD_WIDTH + lanes;
+    return packet * SIMD_WIDTH + vi_lanes();
 }
 
 /* Sets the rays to all rays of a packet, which share the cell in the given lane. packet: its index in the tile. */

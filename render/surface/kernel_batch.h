@@ -6,8 +6,8 @@
  * listed one after the other, and SIMD_WIDTH of these rays are traced at once. Each lane then has a ray and the index
  * of the lane that holds its cell, and reads the cell's numbers from the batch's vectors by a permutation.
  *
- * If a box fills most of its blocks (squares of 4 × 4 pixels), all pixels of the blocks are listed instead. Vectors of
- * such rays are whole packets of the tile. Their hits are accepted with all lanes at once. */
+ * If a box fills at least half of its blocks (squares of 4 × 4 pixels), all pixels of the blocks are listed instead.
+ * Vectors of such rays are whole packets of the tile. Their hits are accepted with all lanes at once. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
@@ -183,23 +183,21 @@ static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_
     kernel_line_field_move(out, &r->rays, depth, last, kernel_gather_lane(b->line_along, r->lane));
 }
 
-/* Accepts plain hits of one vector of rays (kernel_ray_accept()) with the colours of their isovalues. places: position
- * of each ray among the tile's packets; lanes[i]: the lane that holds the cell of ray i. Returns a mask of the blocks
- * that contain a ray whose hit is nearer than its previous one. */
-static unsigned kernel_batch_accept_plain(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
-                                          unsigned hit, vf depth)
+/* Computes a vector along the normal at the hit of each ray, in camera axes. */
+SIMD_INLINE void kernel_batch_normals(const kernel_tile_trace *t, kernel_batch *b, vi lane, vf normal[3])
 {
-    unsigned blocks = 0;
-    int32_t at[SIMD_WIDTH];
     if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
-    memcpy(at, &places, sizeof at);
-    for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), n = lanes[i];
-        const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
-        const float *colour = t->surface->layer->colours + 3 * b->queued->value[n];
-        blocks |= kernel_ray_accept(t, at[i], b->queued, n, depth[i], normal, colour);
-    }
-    return blocks;
+    for (int a = 0; a < 3; a++) normal[a] = vf_permute(b->normal[a], lane);
+}
+
+/* Accepts plain hits (kernel_tile_hits_are_plain()) of one vector of rays. Returns a mask of the blocks that contain a
+ * ray whose hit is nearer than its previous one. */
+static __attribute__((noinline)) unsigned kernel_batch_accept_plain(kernel_tile_trace *t, kernel_batch *b,
+                                                                    const kernel_lane_rays *r, vm hit, vf depth)
+{
+    vf normal[3];
+    kernel_batch_normals(t, b, r->lane, normal);
+    return kernel_lane_hits_accept_opaque(t, b->queued, r, hit, depth, normal, NULL);
 }
 
 /* Accepts the hits of one vector of rays on a layer of any kind. is_whole: set if the rays are a whole packet; w:
@@ -209,12 +207,13 @@ static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace 
                                                               vf depth, vf w)
 {
     kernel_line_field along;
-    kernel_surface_hits h = {.t = depth, .w = w, .vertex_count = 4};
-    if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
-    for (int a = 0; a < 3; a++) {
-        h.normal[a] = vf_permute(b->normal[a], r->lane);
-        h.vertices[a] = (const float(*)[SIMD_WIDTH])b->tets.at[a];
-    }
+    kernel_surface_hits h; /* no initializer, because it would clear all members */
+    h.t = depth;
+    h.w = w;
+    h.vertex_count = 4;
+    h.along = NULL;
+    kernel_batch_normals(t, b, r->lane, h.normal);
+    for (int a = 0; a < 3; a++) h.vertices[a] = (const float(*)[SIMD_WIDTH])b->tets.at[a];
     h.vertices[3] = (const float(*)[SIMD_WIDTH])b->tets.f;
     if (t->surface->layer->lines) {
         kernel_batch_line_field(t, b, r, vm_bits(hit), depth, &along);
@@ -252,12 +251,11 @@ SIMD_INLINE void kernel_batch_trace_rays(kernel_tile_trace *t, kernel_batch *b, 
         const bool is_whole = first < b->whole_count;
         const vm hit = kernel_batch_find_hits(t, b, &r, is_whole, has_colour, &depth, &w);
         if (!vm_any(hit)) continue;
-        if (!has_colour && b->is_plain && !is_whole) {
-            nearer |= kernel_batch_accept_plain(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
-        } else {
-            const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
+        const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
+        if (!has_colour && b->is_plain && !is_whole)
+            nearer |= kernel_batch_accept_plain(t, b, &own, hit, depth);
+        else
             nearer |= kernel_batch_accept(t, b, &own, is_whole, hit, depth, w);
-        }
     }
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     b->rays.count = b->whole_count = 0;
@@ -297,7 +295,7 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
     for (int n = 0; n < queued->count; n++) {
         const unsigned blocks = kernel_surface_cells_visible_blocks(t, queued, n);
         if (!blocks) continue;
-        if (2 * KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 3 * kernel_box_pixels(queued->box[n]))
+        if (KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 2 * kernel_box_pixels(queued->box[n]))
             kernel_batch_list_rays(t, b, n, blocks, true);
         else
             small |= 1u << n;

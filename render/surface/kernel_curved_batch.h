@@ -311,24 +311,6 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
         }
 }
 
-/* Accepts plain hits of one vector of rays (kernel_ray_accept()) with the colours of their isovalues. */
-SIMD_INLINE unsigned kernel_curved_batch_accept_plain(kernel_tile_trace *t, const kernel_curved_batch *h,
-                                                      const kernel_lane_rays *p, vm hit, const kernel_point *points,
-                                                      const vf normal[3])
-{
-    unsigned blocks = 0;
-    int32_t at[SIMD_WIDTH], lanes[SIMD_WIDTH];
-    vi_store(at, p->at);
-    vi_store(lanes, p->lane);
-    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
-        const int i = __builtin_ctz(left), n = lanes[i];
-        const float own_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
-        const float *colour = t->surface->layer->colours + 3 * h->queued->value[n];
-        blocks |= kernel_ray_accept(t, at[i], h->queued, n, points->t[i], own_normal, colour);
-    }
-    return blocks;
-}
-
 /* Accepts the hits of one vector of rays. points: the hits; normal: as in kernel_hits, a vector along the normal or
  * reference coordinates. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
@@ -337,7 +319,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
 {
     const render_surface_layer *layer = t->surface->layer;
     const int type = h->queued->type;
-    if (kernel_tile_hits_are_plain(t)) return kernel_curved_batch_accept_plain(t, h, p, hit, points, normal);
+    if (kernel_tile_hits_are_plain(t))
+        return kernel_lane_hits_accept_opaque(t, h->queued, p, hit, points->t, normal, NULL);
     kernel_line_field along;
     kernel_surface_hits hits = {.t = points->t, .vertex_count = grid_type_vertices(type)};
     memcpy(hits.normal, normal, sizeof hits.normal);

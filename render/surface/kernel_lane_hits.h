@@ -129,17 +129,24 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }
 
-/* Accepts the hits of a surface whose colours have been computed. lanes: lane of each ray's cell. Returns a mask of the
- * blocks that contain a ray whose hit is nearer than its previous one. */
+/* Accepts hits of an opaque surface ray by ray (kernel_ray_accept()). normal: per ray, as in kernel_hits; colour: per
+ * ray, before lighting, or NULL for the colours of the isovalues. Returns a mask of the blocks that contain a ray whose
+ * hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_lane_hits_accept_opaque(kernel_tile_trace *t, const kernel_surface_cells *cells,
-                                                    const kernel_lane_rays *r, vm hit, const kernel_surface_hits *h)
+                                                    const kernel_lane_rays *r, vm hit, vf depth, const vf normal[3],
+                                                    const vf *colour)
 {
     unsigned blocks = 0;
+    int32_t at[SIMD_WIDTH], lanes[SIMD_WIDTH];
+    vi_store(at, r->at);
+    vi_store(lanes, r->lane);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
-        const int i = __builtin_ctz(left);
-        const float normal[3] = {h->normal[0][i], h->normal[1][i], h->normal[2][i]};
-        const float colour[3] = {h->colour[0][i], h->colour[1][i], h->colour[2][i]};
-        blocks |= kernel_ray_accept(t, r->at[i], cells, r->lane[i], h->t[i], normal, colour);
+        const int i = __builtin_ctz(left), n = lanes[i];
+        const float ray_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
+        float ray_colour[3];
+        for (int a = 0; colour && a < 3; a++) ray_colour[a] = colour[a][i];
+        blocks |= kernel_ray_accept(t, at[i], cells, n, depth[i], ray_normal,
+                                    colour ? ray_colour : t->surface->layer->colours + 3 * cells->value[n]);
     }
     return blocks;
 }
@@ -184,7 +191,8 @@ static __attribute__((noinline)) unsigned kernel_lane_hits_accept(kernel_tile_tr
     kernel_packet_of_lane_rays(t, r, &rays);
     kernel_lane_hits_set_cells(t, cells, r->lane, h);
     hit = kernel_colour_hits(&rays, s, hit, h);
-    if (kernel_tile_layer_is_opaque(t)) return kernel_lane_hits_accept_opaque(t, cells, r, hit, h);
+    if (kernel_tile_layer_is_opaque(t)) 
+        return kernel_lane_hits_accept_opaque(t, cells, r, hit, h->t, h->normal, h->colour);
     hit = kernel_lane_hits_add_crossings(t, r, hit, h->t);
     if (vm_any(hit)) kernel_emit_transparent(&rays, s, hit, h);
     return 0;
