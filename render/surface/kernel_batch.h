@@ -56,19 +56,6 @@ SIMD_INLINE void kernel_batch_vertices(const kernel_batch *b, int n, int64_t out
     for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_index(b->queued, b->tets.vertex[i][n]);
 }
 
-/* Reads the colour field at the vertices of the cells, in the domain of its transfer function. */
-static __attribute__((noinline)) void kernel_batch_fetch_colours(const kernel_tile_trace *t, kernel_batch *b)
-{
-    const kernel_surface *s = t->surface;
-    for (int n = 0; n < b->queued->count; n++) {
-        float own[4];
-        int64_t vertices[4];
-        kernel_batch_vertices(b, n, vertices);
-        kernel_read_colour_values(s, b->queued->part, b->queued->cell[n], vertices, 4, own);
-        for (int i = 0; i < 4; i++) b->tets.colours[i][n] = own[i];
-    }
-}
-
 /* Sets up the batch with the queue's cells. */
 static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace *t, kernel_batch *b,
                                                          kernel_surface_cells *queued)
@@ -84,7 +71,9 @@ static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace
     b->has_normals = false;
     b->line_lanes = 0;
     b->rays.count = b->whole_count = 0;
-    if (layer->colour_map) kernel_batch_fetch_colours(t, b);
+    if (layer->colour_map)
+        kernel_surface_cells_read_colours(t->surface, queued, (const int32_t(*)[SIMD_WIDTH])b->tets.vertex,
+                                          (float(*)[SIMD_WIDTH])b->tets.colours);
 }
 
 /* Computes a vector along the gradient of the field in each cell of the batch, by Cramer's rule in double. The vector's

@@ -284,21 +284,6 @@ SIMD_INLINE void kernel_curved_batch_line_field(const kernel_tile_trace *t, cons
     kernel_map_line_field(&t->tile, &map, c, r, out);
 }
 
-/* Reads the colour field at the vertices of the lanes' cells, in the cells' order of vertices. */
-static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const kernel_tile_trace *t,
-                                                                        kernel_curved_batch *h)
-{
-    const kernel_surface *s = t->surface;
-    const grid_field *field = &s->layer->colour_field.fields[h->queued->part];
-    const int count = grid_type_vertices(h->queued->type);
-    for (int n = 0; n < h->queued->count; n++)
-        for (int i = 0; i < count; i++) {
-            const int64_t vertex = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
-            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->queued->cell[n] : vertex);
-            h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
-        }
-}
-
 /* Reads the field of the contour lines at the vertices of the lanes' cells. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
@@ -515,7 +500,9 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])h->transformed.world,
                                    grid_type_vertices(queued->type));
     if (h->transformed.cuboids) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
-    if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
+    if (t->surface->layer->colour_map)
+        kernel_surface_cells_read_colours(t->surface, queued, (const int32_t(*)[SIMD_WIDTH])h->transformed.vertex,
+                                          h->colours);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->copied_lanes = 0;
     kernel_curved cells = kernel_curved_batch_cells(h);

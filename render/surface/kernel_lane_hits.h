@@ -191,7 +191,7 @@ static __attribute__((noinline)) unsigned kernel_lane_hits_accept(kernel_tile_tr
     kernel_packet_of_lane_rays(t, r, &rays);
     kernel_lane_hits_set_cells(t, cells, r->lane, h);
     hit = kernel_colour_hits(&rays, s, hit, h);
-    if (kernel_tile_layer_is_opaque(t)) 
+    if (kernel_tile_layer_is_opaque(t))
         return kernel_lane_hits_accept_opaque(t, cells, r, hit, h->t, h->normal, h->colour);
     hit = kernel_lane_hits_add_crossings(t, r, hit, h->t);
     if (vm_any(hit)) kernel_emit_transparent(&rays, s, hit, h);

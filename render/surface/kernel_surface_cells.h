@@ -5,6 +5,7 @@
 
 #include "grid.h"
 #include "kernel_arrays.h"
+#include "kernel_cell_values.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "simd.h"
@@ -94,6 +95,23 @@ static __attribute__((noinline)) void kernel_surface_cells_copy(const kernel_til
             for (int a = 0; a < 3; a++) own->copied[a][at] = world[a];
             own->copied[3][at] = grid_field_value(field, own->index[at]);
         }
+}
+
+/* Reads the colour field at the vertices of the cells, in the domain of its transfer function. vertex: indices of the
+ * vertices in the queue's arrays, by vertex and lane; out: the values, by vertex and lane. */
+static __attribute__((noinline)) void kernel_surface_cells_read_colours(const kernel_surface *s,
+                                                                        const kernel_surface_cells *own,
+                                                                        const int32_t (*vertex)[SIMD_WIDTH],
+                                                                        float (*out)[SIMD_WIDTH])
+{
+    const int count = grid_type_vertices(own->type);
+    for (int n = 0; n < own->count; n++) {
+        int64_t vertices[8];
+        float values[8];
+        for (int i = 0; i < count; i++) vertices[i] = kernel_surface_cells_index(own, vertex[i][n]);
+        kernel_read_colour_values(s, own->part, own->cell[n], vertices, count, values);
+        for (int i = 0; i < count; i++) out[i][n] = values[i];
+    }
 }
 
 /* Returns the blocks in which the cell in lane n may be visible: traced blocks that it may meet, with a ray that has no
