@@ -95,7 +95,7 @@ static insitu_status create_session(const session_team *team, const session_scen
     if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;
-    session_team_count_node(&session->team);
+    session_team_find_nodes(&session->team);
     session->space.scale = 1;
     session_report_create(&session->report);
     status = session_load_scene(&session->scene_file, &session->team, source, error);

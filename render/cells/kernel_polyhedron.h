@@ -123,7 +123,7 @@ SIMD_INLINE kernel_tile_position kernel_polyhedron_position(const polyhedron *c,
     return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
-SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
+SIMD_INLINE kernel_edge_error kernel_polyhedron_compute_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
     const kernel_line line =
         kernel_line_in_packet(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
@@ -149,9 +149,9 @@ SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet 
     if (!p->is_pencil) return;
     kernel_edge_error most = {0, 0};
     for (int i = 0; i < c->edge_count; i++)
-        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
+        most = kernel_edge_error_max(most, kernel_polyhedron_compute_line(c, p, i, c->edges[i][0], c->edges[i][1]));
     for (int i = 0; i < c->vertex_count; i++)
-        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
+        most = kernel_edge_error_max(most, kernel_polyhedron_compute_line(c, p, c->edge_count + i, i, c->vertex_count));
     c->least = kernel_least_weight_bound(most);
 }
 

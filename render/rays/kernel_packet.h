@@ -55,7 +55,7 @@ typedef struct kernel_packet {
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
 /* Computes a ray in tree space: its point at t is base + t * direction. px, py: slope or offset of the ray's column and
- * row of pixels (kernel_ray_parameter_of_column(), kernel_ray_parameter_of_row()). */
+ * row of pixels (kernel_column_slope(), kernel_row_slope()). */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -73,8 +73,8 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        px[i] = kernel_ray_parameter_of_column(p->frame, p->column[i]);
-        py[i] = kernel_ray_parameter_of_row(p->frame, p->row[i]);
+        px[i] = kernel_column_slope(p->frame, p->column[i]);
+        py[i] = kernel_row_slope(p->frame, p->row[i]);
     }
 }
 

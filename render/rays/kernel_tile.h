@@ -31,8 +31,8 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->x0 = x0;
     tile->y0 = y0;
     tile->depth_shift = f->depth_shift;
-    tile->centre_x = kernel_ray_parameter_of_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
-    tile->centre_y = kernel_ray_parameter_of_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
+    tile->centre_x = kernel_column_slope(f, x0 + 0.5 * (KERNEL_TILE - 1));
+    tile->centre_y = kernel_row_slope(f, y0 + 0.5 * (KERNEL_TILE - 1));
     const bool flat = f->job->camera.is_orthographic;
     tile->shear_x = flat ? 0 : (float)tile->centre_x;
     tile->shear_y = flat ? 0 : (float)tile->centre_y;
@@ -52,8 +52,8 @@ static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
     for (int i = 0; i < KERNEL_TILE; i++) {
-        const double dx = kernel_ray_parameter_of_column(f, tile->x0 + i) - tile->centre_x;
-        const double dy = kernel_ray_parameter_of_row(f, tile->y0 + i) - tile->centre_y;
+        const double dx = kernel_column_slope(f, tile->x0 + i) - tile->centre_x;
+        const double dy = kernel_row_slope(f, tile->y0 + i) - tile->centre_y;
         tile->origin_x[i] = (float)(dx * reach);
         tile->origin_y[i] = (float)(dy * reach);
         tile->slope_x[i] = flat ? 0 : (float)dx;
@@ -90,12 +90,8 @@ static inline void kernel_compute_block_borders(const kernel_frame *f, const ker
                                                 double x[KERNEL_BLOCKS_ACROSS + 1], double y[KERNEL_BLOCKS_ACROSS + 1])
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        x[n] = kernel_ray_parameter_of_column(f, tile ? tile->x0 + n * KERNEL_BLOCK - 0.5
-                                                 : n  ? f->job->camera.width - 0.5
-                                                      : -0.5);
-        y[n] = kernel_ray_parameter_of_row(f, tile ? tile->y0 + n * KERNEL_BLOCK - 0.5
-                                              : n  ? f->job->camera.height - 0.5
-                                                   : -0.5);
+        x[n] = kernel_column_slope(f, tile ? tile->x0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.width - 0.5 : -0.5);
+        y[n] = kernel_row_slope(f, tile ? tile->y0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.height - 0.5 : -0.5);
     }
 }
 

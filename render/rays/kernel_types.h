@@ -146,7 +146,7 @@ typedef struct kernel_pieces {
 } kernel_pieces;
 
 /* Returns the rounded value at which the pieces on both sides of a step of the opacity end. */
-static inline float kernel_step_cut(double step)
+static inline float kernel_rounded_step(double step)
 {
     return (float)(kernel_real)step;
 }
@@ -402,11 +402,14 @@ typedef struct kernel_table {
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;
 
-static inline double kernel_ray_parameter_of_column(const kernel_frame *f, double x)
+/* Returns the slope (perspective) or the offset (orthographic) of the rays of a column of pixels along the camera's
+ * axis `right`; x: the column. */
+static inline double kernel_column_slope(const kernel_frame *f, double x)
 {
     return f->slope_x0 + x * f->slope_dx;
 }
-static inline double kernel_ray_parameter_of_row(const kernel_frame *f, double y)
+/* The same for a row of pixels, along the camera's axis `up`. */
+static inline double kernel_row_slope(const kernel_frame *f, double y)
 {
     return f->slope_y0 + y * f->slope_dy;
 }

@@ -59,7 +59,7 @@ hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const flo
 
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
-static double part_of(double x)
+static double fractional_part(double x)
 {
     return x - floor(x);
 }
@@ -76,7 +76,8 @@ void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
     const int count = job->occlusion->samples;
     const double begin = render_jitter(pixel, (uint32_t)job->frame);
     const double shift = 5.588238 * job->frame;
-    const double turn = part_of(52.9829189 * part_of(0.06711056 * (column + shift) + 0.00583715 * (row + shift)));
+    const double turn =
+        fractional_part(52.9829189 * fractional_part(0.06711056 * (column + shift) + 0.00583715 * (row + shift)));
     double x = cos(turn * 6.283185307179586), y = sin(turn * 6.283185307179586);
     for (int k = 0; k < count; k++) {
         const double share = fmin((k + begin) / count, 1 - 1.0 / 1024), radius = sqrt(share), turned = x;

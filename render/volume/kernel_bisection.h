@@ -52,7 +52,7 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
 {
     vm any = vm_none();
     for (int i = 0; i < t->step_count; i++) {
-        const vf cut = vf_set(kernel_step_cut(t->steps[i]));
+        const vf cut = vf_set(kernel_rounded_step(t->steps[i]));
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -240,10 +240,10 @@ static void kernel_range_between_steps(const kernel_bisection *h, double inside,
     const double *steps = h->list->pieces->steps;
     int n = 0;
     side[0] = -3e38f, side[1] = 3e38f;
-    for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_step_cut(steps[n]);
+    for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_rounded_step(steps[n]);
     /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
      * there */
-    if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_step_cut(steps[n]), side[0]);
+    if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_rounded_step(steps[n]), side[0]);
 }
 
 /* Rounds x to float32 and clamps it to `side`, the range between two neighbouring steps; *rest: the rounding error, 0
@@ -264,8 +264,8 @@ static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const ke
     kernel_range_between_steps(h, sub->middle.v, side);
     if (step)
         return kernel_bound_of_values(h->list->pieces,
-                                      fmin(sub->low, (double)nextafterf(kernel_step_cut(*step), -3e38f)),
-                                      fmax(sub->high, (double)nextafterf(kernel_step_cut(*step), 3e38f)));
+                                      fmin(sub->low, (double)nextafterf(kernel_rounded_step(*step), -3e38f)),
+                                      fmax(sub->high, (double)nextafterf(kernel_rounded_step(*step), 3e38f)));
     const double low = fmin(fmax(sub->low, (double)side[0]), (double)side[1]);
     const double high = fmin(fmax(sub->high, (double)side[0]), (double)side[1]);
     return kernel_bound_of_values(h->list->pieces, low, high);

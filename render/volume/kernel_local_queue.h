@@ -86,7 +86,7 @@ typedef struct kernel_tile_cells {
     /* per lane: first and last column, first and last row of the tile's pixels in which the lane's cell may be visible
      * (kernel_local_pixels()) */
     int32_t pixel_ends[4][SIMD_WIDTH];
-    int alone;              /* the lane whose cell is also stored in `cell` (kernel_tile_make_current()); -1: none */
+    int alone; /* the lane whose cell is also stored in `cell` (kernel_tile_set_current_cell()); -1: none */
     kernel_pixel_list rays; /* pairs of a pixel, in a cell's box, and the lane of that cell */
 } kernel_tile_cells;
 

@@ -167,7 +167,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     for (; __builtin_expect(undecided, 0); undecided &= undecided - 1) {
         const int i = __builtin_ctz(undecided);
         /* near the cell's border, the ray's crossings of faces decide whether the sample lies in the cell */
-        if (kernel_tile_make_current(t, lane[i]))
+        if (kernel_tile_set_current_cell(t, lane[i]))
             kernel_curved_samples(t, at[i] / SIMD_WIDTH, vm_from_bits(1u << at[i] % SIMD_WIDTH), number[i],
                                   number[i] + 1);
     }

@@ -43,7 +43,7 @@ enum { KERNEL_LOCAL_MET, KERNEL_LOCAL_CROSSED, KERNEL_LOCAL_CROSSED_TRIANGLE, KE
 typedef struct kernel_tile_segments {
     kernel_segments packets[KERNEL_TILE_PACKETS];
     float depth;     /* length of the next window in depth; 0 if it has not been determined yet */
-    unsigned blocks; /* blocks of the current window */
+    unsigned blocks; /* mask of the tile's blocks in which segments of the current window may lie */
     int volume;
     float per_t[KERNEL_TILE_PIXELS]; /* unit distances of the transfer function per unit of t, by packet and lane */
     kernel_local_bounds bounds;      /* error bounds of the current vector of cells */
@@ -325,7 +325,7 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
             same |= 1u << at[i] % SIMD_WIDTH;
             wanted &= ~(1u << i);
         }
-        if (!kernel_tile_make_current(t, lane[first])) continue;
+        if (!kernel_tile_set_current_cell(t, lane[first])) continue;
         kernel_curved_segments(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
     }
 }

@@ -289,7 +289,7 @@ SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_s
     const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
     vf to = vf_select(vf_lt(from + 1.5f * share, one), from + share, one);
     for (int i = 0; i < t->step_count; i++) {
-        const vf cut = (kernel_step_cut(t->steps[i]) - whole->v_in) * inverse;
+        const vf cut = (kernel_rounded_step(t->steps[i]) - whole->v_in) * inverse;
         to = vf_select(vf_lt(from, cut), vf_min(cut, to), to);
     }
     return to;

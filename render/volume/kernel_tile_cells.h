@@ -264,7 +264,7 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
 
 /* Makes the cell in the given lane of the current vector the tile's current cell (`cell`), to be processed by packets,
  * for rays of any block. Does nothing if it already is the current cell. Returns false if it is invisible. */
-static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
+static __attribute__((noinline, cold)) bool kernel_tile_set_current_cell(kernel_tile_trace *t, int lane)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     const grid *g = cells->arrays.cells;

@@ -19,9 +19,10 @@ static const double most_units = 0x1p30;
 static const double steepest = 1e6; /* same value as KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
-/* Returns the number of bins for the error bound of a ray's light. The table is not accurate enough for segments whose
- * end values are closer than a distance proportional to the square of a bin's width divided by the error. The table for
- * 1e-2 has 196 KB, which fits into a core's second-level cache next to a tile's rays. */
+/* Returns the number of bins for the error bound of a ray's light. The narrower the bins, the more segments are looked
+ * up in the table: only those whose end values differ by more than a distance, which grows with the square of a bin's
+ * width and falls with the error bound. At 1e-2 the table has 196 KB, so that it fits into a core's second-level cache
+ * beside a tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;

@@ -53,13 +53,15 @@ typedef enum insitu_type {
 
 /* A borrowed array: the caller's memory, read only, never written or kept beyond what insitu_set_mesh() says.
  *
- * "Any integers" are all integer types of insitu_type. Coordinates, arrays of any integers and values of fields may
- * also lie at any address and have any stride, as in packed records; other arrays and their strides are aligned to
- * their element type. Values are always read where they are. So are other arrays that are aligned: coordinates that are
- * float32 or float64, and indices, offsets and numbers of 4 or 8 bytes, unsigned ones as if they were signed: they must
- * be below 2^31 or 2^63, but uint32 may be larger where there are 2^31 vertices or faces. Others are copied once for
- * each topology or geometry, counted in bytes_copied: coordinates that are integers as float64, integers of 1 or 2
- * bytes as int32, arrays that are not aligned in their own type. */
+ * "Any integers" are all integer types of insitu_type. Coordinates, arrays of any integers and values of fields may lie
+ * at any address and have any stride, as in packed records. Other arrays and their strides must be aligned to their
+ * element type.
+ *
+ * Values of fields are always read in place. Three kinds of arrays are copied once for each topology or geometry, and
+ * counted in bytes_copied: coordinates that are integers become float64, integers of 1 or 2 bytes become int32, and
+ * arrays that are not aligned keep their type. All other arrays are read in place. Unsigned integers of 4 or 8 bytes
+ * are then read as signed ones, so they must be below 2^31 or 2^63. Only if a mesh has 2^31 or more vertices or faces,
+ * uint32 indices may be larger. */
 typedef struct insitu_array {
     const void *data; /* first element; NULL: there is no array */
     insitu_type type; /* type of one element */
@@ -101,8 +103,8 @@ typedef enum insitu_cell_type {
     INSITU_BIQUADRATIC_QUAD = 28,   /* 9 nodes */
     INSITU_TRIQUADRATIC_HEX = 29,   /* 27 nodes */
     INSITU_BIQUADRATIC_WEDGE = 32,  /* 18 nodes */
-    /* Cells with all nodes of an order p from 1 to 32 (insitu_mesh.order): equispaced, Gauss-Lobatto or other nodes,
-     * with the nodes of each face and edge on it */
+    /* Cells with all nodes of an order p from 1 to 32 (insitu_mesh.order). Nodes may be equispaced, Gauss-Lobatto
+     * points or others, but those of a face or an edge must lie on that face or edge. */
     INSITU_LAGRANGE_TRIANGLE = 69, /* (p + 1)(p + 2) / 2 nodes */
     INSITU_LAGRANGE_QUAD = 70,     /* (p + 1)^2 */
     INSITU_LAGRANGE_TET = 71,      /* (p + 1)(p + 2)(p + 3) / 6 */

@@ -18,10 +18,10 @@ typedef struct session_derivatives {
     double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
 } session_derivatives;
 
-/* Finds the derivatives of a kind of cell. is_lobatto: nodes along edges are Gauss-Lobatto points, otherwise they are
- * equispaced. parts: the order of the nodes divided by that of the polynomial, so that every parts-th node along each
- * axis determines the polynomial; 1 for serendipity cells. Returns false if memory runs out; the caller must drop *out
- * in any case. */
+/* Computes the derivatives of the shape functions of a type of cell at its nodes. is_lobatto: whether the nodes along
+ * edges are Gauss-Lobatto points; otherwise they are equispaced. parts: the cell may have more nodes than its
+ * polynomial needs; along each axis every parts-th node determines the polynomial. It is 1 for serendipity cells.
+ * Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
