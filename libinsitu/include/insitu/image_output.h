@@ -15,9 +15,10 @@ extern "C" {
 #endif
 
 typedef enum insitu_image_format {
-    INSITU_PNG8 = 0,    /* sRGB, 8 bits per channel, straight alpha; no alpha channel if all pixels are opaque */
-    INSITU_PNG16 = 1,   /* same as INSITU_PNG8 with 16 bits per channel */
-    INSITU_EXR = 2,     /* linear premultiplied float RGBA, the channel Z if depth is given, and channels */
+    INSITU_PNG8 = 0,  /* sRGB, 8 bits per channel, straight alpha; no alpha channel if all pixels are opaque */
+    INSITU_PNG16 = 1, /* same as INSITU_PNG8 with 16 bits per channel */
+    /* linear premultiplied float RGBA, then Z if insitu_image.depth is given, then insitu_image.channels */
+    INSITU_EXR = 2,
     INSITU_DEEP_EXR = 3 /* deep: any number of samples per pixel, each with float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
@@ -54,8 +55,9 @@ typedef struct insitu_colour_bar {
     /* true: each colour fills one band, and all bands have equal width; false: colours are interpolated linearly */
     bool is_banded;
     const float *below; /* 3 values, linear: the colour of values below the low end; NULL: the colour of the low end */
-    const float *above; /* same as below, for values above the high end */
-    insitu_anchor at;   /* position in the picture: INSITU_LEFT or INSITU_RIGHT */
+    /* 3 values, linear: the colour of values above the high end; NULL: the colour of the high end */
+    const float *above;
+    insitu_anchor at; /* position in the picture: INSITU_LEFT or INSITU_RIGHT */
     int tick_count;
     const insitu_tick *ticks;
 } insitu_colour_bar;
@@ -67,9 +69,9 @@ typedef struct insitu_stroke {
     bool is_behind; /* true: surfaces and volumes in the picture hide the line */
 } insitu_stroke;
 
-/* Words beside a point of the picture; they are left out if they would overlap others. */
+/* Words beside a point of the picture. They are left out if they would overlap another decoration. */
 typedef struct insitu_label {
-    double at[2];   /* position of the point in pixels, in the coordinates of a stroke */
+    double at[2];   /* position of the point in pixels; (0, 0) is the upper left corner of the picture */
     double away[2]; /* unit vector from the point to the words */
     double gap;     /* distance between the point and the words, as a multiple of the height of words */
     char text[32];
@@ -90,7 +92,7 @@ typedef struct insitu_rectangle {
 /* Decorations that are drawn over a picture, and the background that is put behind it first. All pointers are
  * borrowed. */
 typedef struct insitu_decorations {
-    float background[4]; /* linear, premultiplied */
+    float background[4]; /* RGBA of the background, linear, premultiplied */
     float colour[3];     /* colour of words and lines, linear */
     double size;         /* height of words, as a fraction of the picture's height */
     int words_count;
@@ -120,7 +122,7 @@ typedef struct insitu_channel {
 /* An interval [z, z_back] of a volume on a pixel's ray, or a surface, for which z_back equals z. */
 typedef struct insitu_deep_sample {
     float rgba[4];   /* linear, premultiplied */
-    float z, z_back; /* depths in the units of insitu_image */
+    float z, z_back; /* distances from the eye along the camera's axis, in scene units */
 } insitu_deep_sample;
 
 /* The samples of each pixel of an image, by increasing depth and without overlaps. The background is not included. */
@@ -141,7 +143,7 @@ typedef struct insitu_image {
         *decorations; /* NULL: nothing is drawn over the picture, and rgba already includes the background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; ignored if the format has no additional channels */
-    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only these and the size */
+    const insitu_deep *deep; /* NULL, or the samples for INSITU_DEEP_EXR, which uses only them, width and height */
 } insitu_image;
 
 /* Writes to a temporary file beside path and renames it, so that path is never an incomplete picture. Missing folders

@@ -92,8 +92,8 @@ typedef enum insitu_cell_type {
     /* Cells of higher order. Their vertices, at corners and between them, are called nodes here. Each cell is divided
      * into linear cells between its nodes, called pieces, at whatever positions the nodes have. The error decreases
      * with the square of the distance between nodes (docs/high_order.md). Nodes and values at nodes are not copied; the
-     * list of pieces is made once per topology. Numbers of cells, ghost flags, cell values, thresholds and lines along
-     * edges refer to the caller's cells. */
+     * list of pieces is made once per topology. Counts of cells in the report, ghost flags, cell values, thresholds and
+     * lines along edges refer to the caller's cells and not to pieces. */
     INSITU_QUADRATIC_TRIANGLE = 22, /* 6 nodes */
     INSITU_QUADRATIC_QUAD = 23,     /* 8 nodes */
     INSITU_QUADRATIC_TET = 24,      /* 10 nodes */
@@ -136,10 +136,11 @@ typedef enum insitu_vertex_order {
 } insitu_vertex_order;
 
 /* The parts of a mesh or a field that have changed since it was last set. The default, everything, is always safe. Some
- * changes are detected even if the caller does not name them: with other counts or another cell_type, the mesh is
- * treated as a new one (ALL). An array at another address, or of another type or stride, is read again as if its
- * TOPOLOGY (but fields are kept), GEOMETRY (including vertex_ids) or VALUES were named. New contents of the same arrays
- * are not detected, so that the caller must name these changes. */
+ * changes are detected even if the caller does not name them. If counts or cell_type differ from the last call, the
+ * mesh is treated as a new one (ALL). If an array has another address, type or stride, it is read again: an array that
+ * describes cells as if TOPOLOGY were named (but fields are kept), coordinates and vertex_ids as if GEOMETRY were
+ * named, and values as if VALUES were named. New contents of the same arrays are not detected, so that the caller must
+ * name these changes. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
     INSITU_CHANGED_TOPOLOGY = 1, /* the cells, their types and faces, or ghost flags; the bounding volume hierarchy (the
@@ -159,9 +160,9 @@ typedef struct insitu_lattice {
      * without cells. */
     int64_t cells[3];
     /* Distances, in vertices, from one vertex to the next along i, j and k in the vertices' arrays, at least 1 each:
-     * the vertex i, j, k has the number i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each
+     * the vertex i, j, k has the index i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each
      * stride must be larger than the distance that the smaller ones cover, so that no two vertices have the same
-     * number. All 0: the arrays are packed, and i varies fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
+     * index. All 0: the arrays are packed, and i varies fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
     int64_t vertex_strides[3];
     int64_t cell_strides[3]; /* distances, in cells, from one cell to the next along i, j and k in the cells' arrays;
                                 rules as for vertex_strides */
@@ -181,10 +182,11 @@ typedef struct insitu_lattice {
     insitu_array axes[3];
     /* Levels of refinement: the number of the block's cells that make one cell of the coarsest level along each axis,
      * such as 1, 2 or 8. It is at most 2^20, and is not read along an axis without cells. All 0: the mesh has no
-     * levels. first is then the index of the block's first cell among all cells that its level may have; its magnitude
-     * is at most 2^40. A cell is not drawn if the interior of a finer block of the mesh, on any rank, covers it. Finer
-     * blocks must end at borders of the coarser cells that no other block covers. A vertex within a face or an edge of
-     * a coarser cell gets the value that is interpolated on that face or edge, even if values are given at vertices. */
+     * levels. If levels are given, first is the index of the block's first cell along each axis, counted in cells of
+     * the block's level; its magnitude is at most 2^40. A cell is not drawn if the interior of a finer block of the
+     * mesh, on any rank, covers it. Finer blocks must end at borders of the coarser cells that no other block covers. A
+     * vertex within a face or an edge of a coarser cell gets the value that is interpolated on that face or edge, even
+     * if values are given at vertices. */
     int64_t refinement[3];
 } insitu_lattice;
 
@@ -203,7 +205,8 @@ typedef struct insitu_mesh {
     insitu_array vertex_ids;
     int64_t cell_count;         /* number of cells, >= 0, at most 4294967294 */
     insitu_cell_type cell_type; /* type of all cells if cell_types is not given */
-    /* optional, any integers, cell_count: VTK's ids for mixed cells, or the code's own numbers (see cell_type_map) */
+    /* optional, any integers, cell_count: the type of each cell, for meshes with several types. The entries are VTK's
+     * ids, or the simulation's own numbers (see cell_type_map). */
     insitu_array cell_types;
     int64_t connectivity_count; /* number of elements in connectivity */
     /* any integers, connectivity_count: the vertex indices of the cells, counted from index_base, one cell after the
@@ -230,14 +233,17 @@ typedef struct insitu_mesh {
     insitu_array face_connectivity;
     insitu_array ghosts; /* optional, any integers, cell_count: cells with a nonzero flag are not drawn.
                             Flags of 2 bytes, and those that are not aligned, are copied, 1 byte each. */
-    unsigned changed;    /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
+    /* the arrays that have changed: a combination of the bits INSITU_CHANGED_TOPOLOGY and INSITU_CHANGED_GEOMETRY;
+     * INSITU_CHANGED_ALL by default */
+    unsigned changed;
     /* 0 by default, or 1 as in Fortran: the number from which all indices in connectivity, offsets, face_offsets,
      * face_connectivity, face_lists, owner and neighbour are counted */
     int index_base;
     /* Finite-volume codes may give the two cells of each face (docs/finite_volume.md) instead of connectivity, offsets
      * and cell_types, which must then not be given; cell_type is INSITU_POLYHEDRON. The faces' vertices are read in
-     * place. Once for each topology the library lists the faces of each cell, in the order of their numbers: 4 bytes
-     * per cell and up to 8 per face (twice that if there are more than 2^31 of them), counted in bytes_copied. */
+     * place. Once for each topology the library makes a list of the faces of each cell, in ascending order of face
+     * indices. It takes 4 bytes per cell and up to 8 per face (twice that if there are more than 2^31 faces), counted
+     * in bytes_copied. */
     /* int32 or int64, face_count: the cell on one side of each face. If index_base is 1, an owner may be 0, as in CGNS;
      * then the neighbour is the only cell of the face. */
     insitu_array owner;
@@ -275,7 +281,7 @@ typedef struct insitu_mesh {
      * description is copied, the axes are borrowed. Nothing is stored per cell or vertex. */
     const insitu_lattice *lattice;
     /* Codes that store the faces of the boundary in a separate list, such as code_saturne, may give it in addition to
-     * owner and neighbour. Its faces have the numbers from face_count on, also in patches. Both lists are copied into
+     * owner and neighbour. Its faces have the indices from face_count on, also in patches. Both lists are copied into
      * one, once for each topology, which is kept as long as polyhedra are drawn from it, as described at face_lists.
      * Not allowed with face_lists. */
     int64_t boundary_face_count; /* 0 by default */
@@ -288,16 +294,16 @@ typedef struct insitu_mesh {
     /* int32 or int64, boundary_face_count: the only cell of each face; -1 (or 0 if index_base is 1): the face has no
      * cell and is ignored */
     insitu_array boundary_owner;
-    /* 0 by default. Number of halo cells to which owner and neighbour may refer: they are numbered after the mesh's own
-     * cells. Halo cells are not drawn: a face between a cell and a halo cell is on the boundary of this rank's part of
-     * the mesh. */
+    /* 0 by default. Number of halo cells to which owner and neighbour may refer; their indices follow those of the
+     * mesh's cells. Halo cells are not drawn: a face between a cell and a halo cell is on the boundary of this rank's
+     * part of the mesh. */
     int64_t halo_cell_count;
     /* 0 by default; 1: offsets and face_offsets lack their last entry, as in Conduit's Blueprint. The last cell ends at
      * the end of connectivity, the last face at the end of face_connectivity. */
     int open_offsets;
-    /* Optional: the meaning of the code's own numbers in cell_types. The number n stands for the type cell_type_map[n];
-     * an entry of 0 means that no cell has this number. The table is copied by the call. The types are also copied,
-     * with 1 byte per cell. */
+    /* Optional: the meaning of the simulation's own numbers in cell_types. The number n stands for the type
+     * cell_type_map[n]; an entry of 0 means that no cell has this number. The table is copied by the call. The types
+     * are also copied, with 1 byte per cell. */
     int cell_type_map_count;
     const int *cell_type_map;
     /* The order of all cells if cell_type is one of INSITU_LAGRANGE_*. 0, the default: the order follows from the
@@ -344,16 +350,16 @@ typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER
  * if one rank has both. */
 typedef struct insitu_patch {
     int64_t count; /* number of faces, and of tuples of values */
-    /* number of the patch's first face, counted from index_base, if neither faces nor connectivity is given: the patch
-     * consists of `count` faces of the mesh, from this number on */
+    /* used if neither faces nor connectivity is given: index of the patch's first face among the faces of the mesh,
+     * counted from index_base. The patch then consists of `count` consecutive faces. */
     int64_t first_face;
-    /* int32 or int64, count: the numbers of the faces in face_offsets or face_lists, counted from index_base */
+    /* int32 or int64, count: the index of each face in face_offsets or face_lists, counted from index_base */
     insitu_array faces;
     /* The vertices of the faces. They are needed for meshes that are not described by faces, such as those of hexes,
      * and allowed for all others. */
     int64_t connectivity_count; /* number of elements in connectivity */
     /* int32 or int64, connectivity_count: vertex indices counted from index_base, in order around each face in either
-     * direction, as many as that face of the cell has, including repeated ones */
+     * direction. If the cell's own list of a face repeats a vertex, the patch must repeat it too. */
     insitu_array connectivity;
     /* int32 or int64, count + 1, counted from index_base: the index in connectivity at which each face begins. Not
      * needed if all faces have the same number of vertices, connectivity_count / count. */
@@ -392,13 +398,12 @@ typedef struct insitu_field {
     /* float32, float64 or any integers. stride_bytes is the distance from tuple to tuple; 0: component_count
      * elements */
     insitu_array values;
-    unsigned changed; /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */
-    /* Optional, int32 or int64, with vertex_count, cell_count or number of corners elements: the tuple of values that
-     * each vertex, cell or corner has, counted from the mesh's index_base. It allows vectors of degrees of freedom and
-     * arrays with halos. When a step first needs such a field, and again when its values have changed, it is copied
-     * into the order of the vertices, cells or corners, one tuple each, counted in bytes_copied. Entries out of range
-     * are then errors. A rank without vertices, cells or corners may have NULL data here; a type alone states that the
-     * index is given. */
+    unsigned changed; /* INSITU_CHANGED_VALUES or INSITU_CHANGED_NOTHING; INSITU_CHANGED_ALL by default */
+    /* Optional, int32 or int64, one element for each vertex, cell or corner of the mesh: the index of its tuple of
+     * values, counted from the mesh's index_base. It allows vectors of degrees of freedom and arrays with halos. When a
+     * step first needs such a field, and again when its values have changed, it is copied into the order of the
+     * vertices, cells or corners, one tuple each, counted in bytes_copied. Entries out of range are then errors. A rank
+     * without vertices, cells or corners may have NULL data here; a type alone states that the index is given. */
     insitu_array index;
     /* For corner fields on cells of one type without offsets: the number of tuples of values (or entries of index, if
      * that is given) from the first corner of a cell to that of the next, at least the number of its vertices. Further
@@ -415,8 +420,8 @@ typedef struct insitu_field {
     int patch_count;
     const insitu_patch *patches;
     /* Optional, instead of values and component_stride_bytes, which must then not be given: component_count arrays, one
-     * per component, each with any address, type and stride, as values; packed if stride_bytes is 0. The table is
-     * copied, its arrays are borrowed. */
+     * per component. Each array may have any address, type and stride that is allowed for values; its elements are
+     * packed if stride_bytes is 0. The table is copied, its arrays are borrowed. */
     const insitu_array *components;
 } insitu_field;
 
@@ -473,8 +478,8 @@ typedef struct insitu_report {
     int64_t bytes_borrowed; /* size in bytes of the caller's arrays in use */
     int64_t bytes_copied;   /* size in bytes of copies of the caller's data; copied_why has the reasons */
     int64_t bytes_trees;    /* size in bytes of all trees */
-    /* on rank 0: bytes of pictures that wait to be written (at most 128 MiB, or one picture), and of memory kept for
-     * later ones (at most 64 MiB) */
+    /* on rank 0: bytes of pictures that wait to be written (at most 128 MiB, or one picture), plus bytes of memory that
+     * is kept for later pictures (at most 64 MiB) */
     int64_t bytes_pictures;
     int64_t bytes_peak; /* largest number of bytes that the library had allocated at once in this step */
     /* method by which the last frame's fragments were sent, named as in the scene: "direct", "nodes", "radix" or
@@ -569,9 +574,9 @@ INSITU_API insitu_status insitu_set_block_field(insitu_session *session, const c
  *
  * A step that draws uses OpenMP threads: as many as the scene requests, but no more than the number of cores and the
  * number of threads that can be started. Within a parallel region of the caller it uses only the calling thread.
- * That thread needs 320 kB of stack below this call, and the others 256 kB below OpenMP's own; if a stack is
- * smaller, the step fails, and the message names the setting to change. During the call, and in insitu_create(), the
- * caller's floating-point traps and rounding modes are disabled on all these threads. */
+ * The calling thread needs 320 kB of free stack at this call. Each other thread needs 256 kB in addition to the stack
+ * that OpenMP uses. If a stack is smaller, the step fails, and the message names the setting to change. During this
+ * call and insitu_create(), the caller's floating-point traps and rounding modes are disabled on all these threads. */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
 /* Returns the report of the last step. It is valid until the next step, and all zero before the first one. Returns NULL
