@@ -20,7 +20,9 @@ typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
     int64_t count; /* number of elements that the array must have, not counting the additional one of SESSION_HAS_END */
     int flags;     /* a combination of the SESSION_* bits above */
-    int per_tuple; /* distance from one element to the next, in elements, if no stride is given */
+    /* number of array elements from one tuple to the next if the caller gives no stride: the number of interleaved
+     * components, or 1 */
+    int per_tuple;
 } session_array_rule;
 
 /* Checks that the array is given, has an allowed type, is aligned unless the flags allow unaligned arrays, and has a

@@ -100,8 +100,8 @@ typedef struct session_catalogue_mesh {
     bool has_shells_alone;
     /* set if cells, on any rank, are of higher order; computed by session_check_vertex_order() */
     bool has_higher_order;
-    /* set if some of these cells, on any rank, are bent (session_straight.h); computed by session_check_vertex_order()
-     */
+    /* set if cells of higher order, on any rank, are bent (session_straight.h); computed by
+     * session_check_vertex_order() */
     bool has_bent_cells;
     /* error of the mesh; NULL: there is none. The step ignores a mesh with an error, but the catalogue keeps the names
      * of its fields */
@@ -122,13 +122,15 @@ typedef struct session_catalogue_mesh {
 /* A set of meshes across which cell values are averaged at equal vertices. It consists of the meshes without vertex ids
  * that have the field of one layer. A mesh with ids is a mesh group by itself. */
 typedef struct session_mesh_group {
-    /* name of the mesh group, as in scene_field.mesh_group_name or session_catalogue_mesh.single_group_name */
+    /* hash that identifies the mesh group: scene_field.mesh_group_name, or session_catalogue_mesh.single_group_name */
     uint64_t name;
     int count;                       /* number of meshes in the mesh group */
     session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
-    uint64_t positions_hash; /* hash of the vertex positions of all its meshes */
+    /* hash of session_catalogue_mesh.positions_hash of all its meshes, which differs after coordinates of any of them
+     * have changed; 0: not computed yet */
+    uint64_t positions_hash;
     /* home ranks, if the mesh group has several meshes; for a single mesh, session_catalogue_mesh.homes is used
      * instead */
     session_homes own_homes;
@@ -143,7 +145,8 @@ typedef struct session_catalogue {
     bool are_derived;        /* set if the catalogue contains the derived fields of the current scene */
     bool are_meshes_grouped; /* set if the mesh groups are those of the current scene */
     bool are_hashes_known;   /* set if the meshes' hashes of cells and positions are up to date */
-    base_error *fault;       /* error that belongs to no known mesh; no image can be drawn */
+    /* error for which no image can be drawn: it belongs to no known mesh, or memory ran out on some rank; NULL: none */
+    base_error *fault;
     int mesh_count, mesh_group_count;
     session_catalogue_mesh *meshes;
     session_mesh_group **mesh_groups;
@@ -202,8 +205,8 @@ void session_vertex_groups_free(session_vertex_groups *groups);
 /* Returns a hash of this rank's table of names. Two ranks have the same hash if their tables are equal. Local. */
 uint64_t session_hash_names(const session_meshes *meshes);
 
-/* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. Returns NULL if memory runs
- * out. */
+/* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. derived: index of the field
+ * among the scene's derived fields. Returns NULL if memory runs out. */
 session_catalogue_field *session_catalogue_add_field(session_catalogue_mesh *mesh, const char *name,
                                                      int component_count, insitu_centring centring, int derived);
 /* Removes the derived fields from the catalogue. */

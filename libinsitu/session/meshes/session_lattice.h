@@ -13,23 +13,23 @@ bool session_is_quad_lattice(const insitu_lattice *lattice);
 /* Returns whether the coordinates are given along a lattice's axes instead of by vertex. */
 bool session_has_axes(const insitu_mesh *mesh);
 
-/* Returns the INSITU_CHANGED_* bits for the differences between two lattices, either of which may be NULL.
- * INSITU_CHANGED_ALL means that their shapes differ. */
+/* Returns the INSITU_CHANGED_* bits for the differences between two lattices, either of which may be NULL. Returns
+ * INSITU_CHANGED_ALL if their shapes differ, so that the mesh counts as a new one. */
 unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *b);
 
 /* Copies the lattice of the description, if it has one, into the mesh, and makes given.lattice point to the copy.
  * Local. */
 void session_copy_lattice(session_mesh *mesh);
 
-/* Completes the grid of a mesh with a lattice: sets the cell type, the indices and, unless coordinates are given by
- * vertex, the coordinates. */
+/* If the mesh has a lattice, makes its grid compute the vertices of cells from the lattice: sets the cell type, the
+ * lattice and, unless coordinates are given by vertex, the coordinates. */
 void session_read_lattice(session_mesh *mesh, grid *g);
 
 /* Computes the cells[axis] + 1 coordinates along an axis of a lattice that is uniform or rectilinear. Local. */
 void session_fill_axis(const insitu_lattice *lattice, int axis, double *out);
 
-/* Computes the coordinates along the axes from the current contents of the arrays. Fails if one is not finite.
- * Local. */
+/* Computes session_lattice.axis_coordinates from the current contents of the caller's arrays. Does nothing if the
+ * lattice's coordinates are given by vertex. Fails if a coordinate is not finite. Local. */
 insitu_status session_make_axes(session_mesh *mesh, base_error *error);
 
 #endif

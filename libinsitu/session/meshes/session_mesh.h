@@ -44,7 +44,7 @@ typedef struct session_field {
     int64_t version;          /* number of times that the values are known to have changed */
     int64_t source_version;   /* on a mirror image: `version` that the field of the source mesh had when the values were
                                  copied from it */
-    bool has_borrowed_copy;   /* set if `copy` is owned by the field of a mirror image's source */
+    bool has_borrowed_copy;   /* on a mirror image: set if `copy` is owned by the same field of the source mesh */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
     char *copy;               /* packed tuples with interleaved components; NULL: there is no copy yet */
@@ -155,10 +155,10 @@ typedef struct session_outer {
     int64_t *connectivity, *offsets;
     unsigned char *types;
     int64_t *loops; /* outlines of polygons for edge lines, in the format of render_part.loops */
-    /* for each vertex and each cell of the outer mesh: the vertex and the cell of the whole mesh whose values it
-     * takes */
+    /* vertex_origins: for each vertex of the outer mesh, the index of the vertex of the whole mesh that gives its
+     * values; cell_origins: the same for cells */
     int64_t *vertex_origins, *cell_origins;
-    int64_t bytes;
+    int64_t bytes; /* size of all arrays of the outer surface in bytes */
 } session_outer;
 
 /* Arrays owned by the session that are read instead of the caller's arrays (session_topology.h). They are computed once
@@ -169,9 +169,10 @@ typedef struct session_topology {
     /* set if the member `connectivity` below is read instead of the caller's, while the offsets and types are the
      * caller's */
     bool has_own_order;
-    bool has_own_cells;               /* set if the cells below are read instead of the caller's cells */
-    grid_array offsets, connectivity; /* offsets are NULL if all cells have the type cell_type */
-    unsigned char *cell_types;        /* type of each cell; NULL: all cells have the type cell_type */
+    bool has_own_cells; /* set if the cells below are read instead of the caller's cells */
+    /* of the cells that are read; `offsets` has no data if all cells have the type cell_type */
+    grid_array offsets, connectivity;
+    unsigned char *cell_types; /* type of each cell; NULL: all cells have the type cell_type */
     int cell_type;
     bool has_own_faces;                         /* set if the faces below are read instead of the caller's faces */
     grid_array face_offsets, face_connectivity; /* faces of the cells; empty if there are no polyhedra */
@@ -188,7 +189,7 @@ typedef struct session_topology {
     uint32_t *parents;           /* for each piece, the index of the caller's cell from which it was cut */
     /* for each of the caller's cells, the index of its first piece; a final entry has the number of pieces */
     int64_t *first_pieces;
-    unsigned char *ghosts; /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
+    unsigned char *ghosts; /* one byte per piece, nonzero if the caller's cell is a ghost; NULL: there are no ghosts */
 } session_topology;
 
 /* Vertices of a discontinuous mesh (session_discontinuous.h): each corner of each cell has a vertex of its own, which
@@ -202,7 +203,8 @@ typedef struct session_discontinuous {
     bool are_corners_entries;
     int64_t corner_count;
     grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
-    /* for each entry of shared_connectivity, its corner; the permutation is its own inverse */
+    /* connectivity of the discontinuous mesh: for each entry of the connectivity that is read, the index of its corner.
+     * If cells are not split, this is a permutation that is its own inverse. */
     grid_array corners;
     grid_array coordinates[3];
     int64_t bytes;
@@ -220,7 +222,7 @@ typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* Selects, among the linear pieces of cells of higher order, those that are made; the other pieces are not drawn. */
+/* Selects the linear pieces of cells of higher order that are made. Pieces that are not selected are not drawn. */
 typedef struct session_piece_set {
     /* for each cell, the index of its first word in `bits`; a final entry marks the end. If a cell has no words, all of
      * its pieces are made. NULL: all pieces of all cells are made */
@@ -236,13 +238,14 @@ enum { SESSION_FINER_COUNTS = 64 };
  * insitu_report lists them as a copy. */
 typedef struct session_finer {
     bool is_counted; /* set if `counts` were computed for the current cells */
+    /* counts of the mesh's cells of higher order; an enumeration in session_finer.c names the elements */
     int64_t counts[SESSION_FINER_COUNTS];
     int parts; /* number of parts into which each segment between two nodes of an edge is divided; 0: the mesh has no
                   finer lattices, and session_mesh.given is the caller's mesh */
-    /* sizes, and session_mesh.given_counts, that the mesh would have without finer lattices */
+    /* bounds, sizes and counts that the mesh would have without finer lattices */
     session_sizes sizes;
     session_counts given_counts;
-    session_piece_set pieces;
+    session_piece_set pieces; /* the pieces of refined cells that are made */
     /* for each of the caller's cells, a bit mask of its outer faces (session_outer_cells.h); NULL: not computed */
     unsigned char *outer_faces;
     bool is_lobatto;     /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
@@ -314,7 +317,7 @@ typedef struct session_level_box {
 
 /* Describes a finer block that covers only part of a cell of this block, which is an error. */
 typedef struct session_misfit {
-    bool exists; /* set if there is such a block */
+    bool exists; /* set if a finer block covers only part of a cell; the other members then describe this block */
     int axis;    /* axis along which the finer block ends within the cell */
     /* index of the finer block among the blocks of its rank, and its refinement along the axis */
     int64_t block, refinement;
@@ -380,18 +383,18 @@ typedef struct session_mesh {
     bool is_needed; /* set if an image of this step draws the mesh */
     bool has_tree;  /* set if `tree` has been built */
     mmbvh tree;     /* tree over the drawn cells, or over some of them (is_partial) */
-    /* set if the tree contains only candidates: the cells that the current images can show according to their values
-     * (plan/session_candidates.h). Such a tree can be used as long as candidates_key, cells and coordinates are the
-     * same */
+    /* Set if the tree contains only candidates: the cells that the current images can show according to their values
+     * (plan/session_candidates.h). A partial tree can be used until candidates_key, values, cells or coordinates
+     * change. A tree over all drawn cells is called full. */
     bool is_partial;
-    /* set if the bounds of the full tree's nodes enclose only the candidates */
+    /* set if the tree is full, but its nodes' bounds were refitted only for the candidates */
     bool are_bounds_partial;
     double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
-    /* number of steps in which the current full tree, or the most recent one, has been used; 0: there was none yet */
+    /* number of steps that have used the full tree that was built last; 0: no full tree was built yet */
     int full_tree_steps;
-    /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
-     * taken */
+    /* seconds spent on partial trees since the cells last changed, minus the estimated time that refits of a full tree
+     * would have taken. If they exceed the estimated time of building a full tree, a full tree is built. */
     double partial_tree_seconds;
     int scalar_count;
     session_scalar *scalars;
@@ -402,7 +405,7 @@ typedef struct session_mesh {
 
 /* The caller's fill function that is running (session_filled.h). */
 typedef struct session_filling {
-    const char *mesh, *field; /* mesh and field that it fills; NULL: none is running */
+    const char *mesh, *field; /* names of the mesh and the field that it fills; NULL: no fill function is running */
     base_error refused_error; /* error of the first call of the session that the fill function made */
 } session_filling;
 
@@ -410,9 +413,11 @@ typedef struct session_filling {
 typedef struct session_meshes {
     int count, capacity;
     session_mesh **items; /* sorted by name, then by block */
-    /* set if cells or coordinates have changed since the ranks last agreed on an extent */
+    /* set if cells or coordinates have changed since the global bounds were last computed (session_space.h) */
     bool are_cells_changed;
-    bool are_names_changed; /* set if names have changed since the ranks last agreed on a catalogue */
+    /* set if names, vertex ids or levels of refinement have changed since the catalogue (session_catalogue.h) was last
+     * updated */
+    bool are_names_changed;
     /* set if blocks with levels of refinement have changed since covered cells were computed */
     bool are_levels_changed;
     int64_t level_box_count; /* number of entries in level_boxes: the refined blocks of this rank, and refined blocks of
@@ -423,7 +428,8 @@ typedef struct session_meshes {
     bool are_transformed;
     /* error of an insitu_set_*() call that belongs to no stored mesh; it is kept for one step */
     base_error pending_error;
-    char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
+    /* names of the mesh and the field to which pending_error belongs; NULL: to no particular mesh or field */
+    char *pending_mesh, *pending_field;
     /* number of meshes that this step ignores; they are stored in `items` behind the first `count` meshes */
     int excluded_count;
     session_filling filling;
@@ -557,6 +563,7 @@ void session_drop_outer(session_outer *outer, bool with_faces);
 /* Frees the data of all outer surfaces of a mesh. are_cells_new: also frees the lists of outer faces, and removes the
  * outer surfaces with their thresholds. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
+/* Frees all data of the mesh, including its fields; its names and its place in the table remain. */
 void session_drop_contents(session_mesh *mesh);
 /* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
  * still refer to the mesh. */

@@ -32,15 +32,17 @@ double tally_signed_volume(int type, double points[][3]);
  * ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
-/* Checks cells begin .. end - 1 and adds them to the sums. Returns the first bad cell, or end if all are valid. */
+/* Checks cells begin .. end - 1 and adds them to *tally. Returns the index of the first invalid cell, or `end` if all
+ * are valid. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
 /* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,
  * without adding anything, if the mesh is not such a lattice or has ghost flags. */
 bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally);
 
-/* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one,
- * because there may be polyhedra, or because coordinates are not all float or all double. */
+/* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one:
+ * there may be polyhedra, all cells are shells of one type, or the coordinates along the three axes differ in type or
+ * stride. */
 tally_run tally_choose_run(const session_mesh *mesh);
 
 #endif

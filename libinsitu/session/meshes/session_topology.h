@@ -1,5 +1,5 @@
-/* Provides the cells in the form that all other code reads. They are read from the caller's arrays or, if cells are
- * described by their faces, from arrays owned by the session. */
+/* Provides the cells in the form that all other code reads. They are read from the caller's arrays or, if these do not
+ * have this form, from arrays owned by the session (session_make_topology()). */
 #ifndef SESSION_TOPOLOGY_H
 #define SESSION_TOPOLOGY_H
 
