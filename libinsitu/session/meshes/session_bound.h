@@ -48,10 +48,9 @@ typedef struct session_bound_level {
 /* Precomputed matrices and patterns for computing the bounds of cells of one type with one number of nodes. */
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order */
-    session_nodes
-        /* nodes from which polynomials are computed: nodes.complete or, for pyramids, which are read as hexes with an
-         * upper face that is collapsed to the apex, the nodes of a hex */
-        lattice;
+    /* the nodes from which polynomials are computed: nodes.complete, except for pyramids. A pyramid is read as a hex
+     * whose upper face is collapsed to the apex, so that these are the nodes of a hex. */
+    session_nodes lattice;
     /* for pyramids, the matrix that computes values at the nodes of `lattice` from values at nodes.complete; otherwise
      * NULL */
     double *collapse;
@@ -59,6 +58,8 @@ typedef struct session_bound {
     int level_count;
     /* finer lattices that may be used; the order of each is twice that of the one before */
     session_bound_level levels[BOUND_MOST_LEVELS];
+    /* The factors of which the cell is a product. line: used for the axes of hexes, quads and pyramids and for axis k
+     * of wedges; simplex: a triangle, used for triangles and wedges, or a tet, used for tets */
     session_bound_factor line, simplex;
 } session_bound;
 
@@ -77,7 +78,7 @@ typedef struct session_isovalues {
                          both sides, contains an isovalue */
 } session_isovalues;
 
-/* Returns whether any isovalue is in the interval. */
+/* Returns whether any isovalue is in the closed interval from `low` to `high`. */
 bool session_is_any_between(const session_isovalues *isovalues, double low, double high);
 
 /* Returns the number of doubles of working memory that session_may_cross() and session_bound_cell() need. */
@@ -88,8 +89,8 @@ size_t session_bound_work_size(const session_bound *of);
  * work: session_bound_work_size() doubles of working memory. */
 bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work);
 
-/* Bounds of the errors of one cell, in units of coordinates, if linear pieces connect neighbouring nodes. If each edge
- * between two nodes is cut into n pieces, the errors are these divided by the square of n. */
+/* Bounds of the errors of one cell, in units of coordinates, if the cell is drawn as linear pieces between its nodes.
+ * If each edge between two nodes is cut into n pieces instead, the errors must be divided by n^2. */
 typedef struct session_cell_bound {
     double centre[3], radius; /* a sphere that contains the cell */
     /* set if the cell may contain a part of an isosurface, or if no isovalues are given. It is false if a value or a

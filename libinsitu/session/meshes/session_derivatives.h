@@ -7,12 +7,14 @@
 
 #include "session_rows.h"
 
-/* The derivatives in cells of one kind. Each derivative is a sum of terms, the products of a weight and the value at a
- * node. Those of the derivative at node n along axis a have the indices from starts[axis_count * n + a] up to the next
- * element of `starts`. */
+/* The derivatives in cells of one kind. Each derivative is a sum of terms, and a term is the product of a weight and
+ * the value at a node. For node n and axis a, let s be axis_count * n + a: the terms of this derivative have the
+ * indices starts[s] .. starts[s + 1] - 1. */
 typedef struct session_derivatives {
-    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
-    double first_segment; /* distance between the first two nodes of an edge of length 1 */
+    int axis_count; /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
+    /* distance between the first two nodes of an edge of length 1, by which equispaced nodes are distinguished from
+     * Gauss-Lobatto points */
+    double first_segment;
     int *starts;
     int *nodes;      /* for each term, the position of its node in the cell's list of nodes in the connectivity */
     double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
@@ -20,8 +22,8 @@ typedef struct session_derivatives {
 
 /* Computes the derivatives of the shape functions of a type of cell at its nodes. is_lobatto: whether the nodes along
  * edges are Gauss-Lobatto points; otherwise they are equispaced. parts: the cell may have more nodes than its
- * polynomial needs; along each axis every parts-th node determines the polynomial. It is 1 for serendipity cells.
- * Returns false if memory runs out; the caller must drop *out in any case. */
+ * polynomial needs; along each axis every parts-th node determines the polynomial. For serendipity cells, parts
+ * must be 1. Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);

@@ -2,10 +2,11 @@
  *
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
  * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads these
- * cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by the same
- * numbers. Cells do not share nodes. Nodes on common faces have the same bits in all cells (session_interpolation.h),
- * so that they are found by their coordinates. In this file, members and parameters named `parts` are the number n; a
- * part of a mesh is one rank's part, or one block of it (session_mesh.h). */
+ * cells in place of the caller's: it splits them into linear pieces and finds their gradients. Their indices are those
+ * of the caller's cells. Each cell has its own nodes. On a face that several cells have in common, the coordinates of
+ * their nodes are bitwise equal (session_interpolation.h), so that equal nodes are found by their coordinates. In this
+ * file, members and parameters named `parts` are the number n; a part of a mesh is one rank's part, or one block of it
+ * (session_mesh.h). */
 #ifndef SESSION_FINER_H
 #define SESSION_FINER_H
 
@@ -39,7 +40,9 @@ typedef struct session_finer_choice {
     int64_t excluded_count; /* number of pyramids of an order above INTERPOLATION_MOST_PYRAMID; a mesh with such
                                pyramids cannot have finer lattices */
     bool is_lobatto;        /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
-    int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
+    /* number of parts into which refined cells divide an edge between two nodes, 1 .. FINER_MOST_PARTS; chosen by the
+     * caller */
+    int parts;
     /* used if `parts` is 1: set by the caller if nodes are added to serendipity cells, so that they have all nodes of
      * their order */
     bool is_completed;
@@ -69,8 +72,8 @@ static inline session_cell_marks *session_get_marks_of_part(const session_finer_
     return part < choice->mark_count ? &choice->marks[part] : NULL;
 }
 
-/* Adds to out[n], for each number n of parts of an edge, the size in bytes of finer lattices in marked cells and in all
- * other cells. The size is 0 for n = 1. Local. */
+/* Adds to out[n] the size in bytes of the mesh's finer lattices if marked cells have n parts between two nodes and all
+ * other cells have one part. n is 2 .. FINER_MOST_PARTS. marks: NULL: all cells are marked. Local. */
 void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 
@@ -91,15 +94,17 @@ void session_end_finer_lattices(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */
 typedef struct session_node_values {
-    const void *of;
-    /* set if nodes are identified by entries of connectivity, counted without unused entries; otherwise they are
-     * identified by vertices */
+    const void *of; /* the state that is passed to read() */
+    /* set if `position` is the index of an entry of connectivity, where unused entries are not counted; otherwise it is
+     * the index of a vertex */
     bool is_by_entry;
     int component_count; /* number of components of a tuple */
+    /* reads the tuple of values at one node */
     void (*read)(const void *of, int64_t position, double *tuple);
 } session_node_values;
 
-/* Computes the tuples at all nodes of a mesh with finer lattices. Local. */
+/* Computes the tuples at all nodes of a mesh's finer lattices from the values at the nodes of the caller's cells. `out`
+ * receives them in the order of the vertices of session_finer.fine. Local. */
 insitu_status session_interpolate_values(const session_mesh *mesh, const session_node_values *values, int threads,
                                          double *out, base_error *error);
 

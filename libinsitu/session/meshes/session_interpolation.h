@@ -7,6 +7,8 @@
 
 #include "session_nodes.h"
 
+/* INTERPOLATION_SIDES: number of elements of session_interpolation.sides; INTERPOLATION_MOST_SIDES: maximum number of
+ * faces or edges in one of them */
 enum { INTERPOLATION_SIDES = 3, INTERPOLATION_MOST_SIDES = 12 };
 
 /* The faces of a cell with the same number of corners, or its edges. The nodes of a face can be listed in several
@@ -18,6 +20,7 @@ typedef struct session_interpolation_sides {
     int turn_count;   /* number of orders in which the nodes of a face or edge can be listed */
     /* number of nodes of one such face or edge, in the cell's lattice (node_count) and in the finer one (fine_count) */
     int node_count, fine_count;
+    /* for each face or edge, the indices of its corners among the cell's corners, in order around it */
     signed char corners[INTERPOLATION_MOST_SIDES][4];
     int *nodes;      /* for each face or edge and each order, the indices of its nodes in `complete` */
     int *fine_nodes; /* for each face or edge and each order, the indices of its finer nodes in `fine` */
@@ -34,14 +37,16 @@ typedef struct session_interpolation {
     int corners[8]; /* for each corner, in VTK's order, its position in the cell's list of nodes in the connectivity */
     /* matrix that gives the values at the finer nodes of an edge (rows) from those at the edge's nodes (columns) */
     double *line;
-    double *triangle; /* weights of triangles; NULL if the type of cell has none */
+    /* matrix that gives the values at the finer nodes of a triangle (rows) from those at the triangle's nodes
+     * (columns), for triangular faces and the layers of wedges; NULL for hexes and quads */
+    double *triangle;
     /* for tets and pyramids: matrix that gives the values at all nodes of `fine` (rows) from those at all nodes of
      * `complete` (columns) */
     double *whole;
     /* faces and edges: quads, triangles, edges, in this order */
     session_interpolation_sides sides[INTERPOLATION_SIDES];
-    int own_count; /* number of the cell's own nodes that are fine nodes, too */
-    int (*own)[2]; /* for each of these nodes, its indices in `complete` and in `fine` */
+    int own_count; /* number of the cell's own nodes that coincide with a node of the finer lattice */
+    int (*own)[2]; /* for each such node of the cell, its index in `complete` and the index in `fine` */
 } session_interpolation;
 
 /* Largest order of pyramids that can be interpolated, because a matrix of all of their nodes is inverted. */

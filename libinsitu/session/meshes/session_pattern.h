@@ -6,11 +6,13 @@
 
 #include "session_nodes.h"
 
+/* Maximum numbers of the pieces (loose) and the polygons of a serendipity cell. */
 enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
 
-/* A triangle or quad whose vertices are midpoints of edges. */
+/* A polygon by which a serendipity cell is split; its vertices are midpoints of the cell's edges. Each corner of the
+ * cell is cut off by one polygon (in a quad, by a line of two vertices), and one polygon remains of each face. */
 typedef struct pattern_polygon {
-    int count;
+    int count;  /* number of vertices: 2, 3 or 4 */
     int corner; /* the corner of the cell that the polygon cuts off, or -1 if the polygon lies on a face of the cell */
     int nodes[4]; /* positions of the vertices in the cell's row of nodes */
 } pattern_polygon;
@@ -22,7 +24,7 @@ typedef struct session_pattern {
     session_nodes nodes;
     /* piece_count: number of listed pieces; piece_size: number of entries of `piece_positions` */
     int piece_count, piece_size;
-    unsigned char *types;
+    unsigned char *types; /* GRID_* type of each listed piece */
     /* vertices of the pieces, one piece after the other, as positions in the cell's list of nodes */
     int *piece_positions;
     int polygon_count; /* number of polygons of a serendipity cell; 0 for all other cells */

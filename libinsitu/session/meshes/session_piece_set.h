@@ -1,7 +1,7 @@
 /* Sets of linear pieces in refined cells, that is, cells of higher order in which polynomials are evaluated between the
- * nodes (session_finer.h). A cell is refined if it is marked. Only pieces that an isosurface or a slice may cross are
- * made, and one piece at each of the cell's own nodes. Their number therefore grows with the square of the number of
- * pieces along an edge, not with its cube. */
+ * nodes (session_finer.h). A cell is refined if it is marked. Only the following pieces of it are made: those that an
+ * isosurface or a slice may cross, those on outer faces that an image shows, and one piece at each of the cell's own
+ * nodes. Their number therefore grows with the square of the number of pieces along an edge, not with its cube. */
 #ifndef SESSION_PIECE_SET_H
 #define SESSION_PIECE_SET_H
 

@@ -16,12 +16,12 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
  * connectivity, where unused entries at the end of each cell's entries are not counted. Local. */
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
-/* Converts the index of an entry of the caller's connectivity: from an index that does not count the unused entries at
- * the end of each cell's entries to the index in the caller's array. */
+/* Returns the index of an entry in the caller's connectivity. `entry` is its index if the unused entries at the end of
+ * each cell's row are not counted. */
 int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
 
-/* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat, and inverted if
- * one of its pieces is inverted; this is tested only if any_inverted is set. Local. */
+/* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat. It is inverted
+ * if at least one of its pieces is inverted; inverted cells are counted only if any_inverted is set. Local. */
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
 
 /* Returns the number of the caller's cells that have at least one piece in the list. If memory runs out, returns the
