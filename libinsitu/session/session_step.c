@@ -282,7 +282,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.public_report.prepare_ms = milliseconds_since(start);
-    /* phases above may have stored an error only in *error; the next reduction passes it to all ranks */
+    /* a phase above may have stored an error in *error without returning it; the next session_agree() returns it on all
+     * ranks */
     if (!status) {
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.public_report,

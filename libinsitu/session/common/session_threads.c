@@ -168,8 +168,9 @@ static void join_trial_threads(trial *t)
     base_free(t->spare_memory);
 }
 
-/* Tries to start threads before a rank's first parallel region, if any rank needs more threads than it has. All ranks
- * try at the same time, because ranks on a node share its limits. Collective. */
+/* Starts the threads that this rank still needs as a trial, and stores in *threads how many are available. Must be
+ * called before the step's first parallel region. All ranks try at the same time, because ranks on a node share its
+ * limits. Collective. */
 static insitu_status start_threads_as_trial(session_threads *threads, int requested, MPI_Comm comm, base_error *error)
 {
     const int living = count_living_threads(threads), lacking = requested - living;
@@ -220,7 +221,8 @@ static thread_stack find_stack_of_thread(void)
     return (thread_stack){(int64_t)(here - low), (int64_t)size};
 }
 
-/* Returns the smallest stack of all workers. */
+/* Returns the smallest number of free bytes and the smallest size of the stacks of all OpenMP threads except the
+ * calling one. The two may be those of different threads. */
 static thread_stack find_least_worker_stack(int threads)
 {
     int64_t left = INT64_MAX, size = INT64_MAX;

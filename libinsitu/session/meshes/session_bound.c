@@ -25,10 +25,10 @@
  * The isosurface of the pieces is at x_m(a) with f_m(a) = v. Here a is a point of the reference cell, v the isovalue,
  * x_m and f_m the interpolated position and field, and x and f their polynomials. x(a) differs from x_m(a) by at most
  * the positions' bound. There f differs from v by at most the field's bound. So the isosurface of f is at most the
- * field's bound, divided by the length of the gradient, away from x(a). The length of the gradient is computed at the
- * corners of the pieces that may be crossed: it is the least component of these gradients along their mean, and no mean
- * of these gradients is shorter. The difference between the gradient in a piece and such a mean depends on third
- * derivatives and the square of the size of pieces, and is neglected. */
+ * field's bound, divided by the length of the gradient, away from x(a). A lower bound of this length is computed for
+ * each piece that may be crossed, from the gradients at its corners: it is the least component of these gradients along
+ * their mean, because no weighted mean of these gradients is shorter. The difference between the gradient in a piece
+ * and such a mean depends on third derivatives and the square of the size of pieces, and is neglected. */
 #include "session_bound.h"
 
 #include <math.h>
@@ -46,7 +46,7 @@ enum {
     COARSE = 4,          /* minimum order of the first, coarsest lattice */
     FINE = 16,           /* maximum order of all further lattices */
     MOST_DIRECTIONS = 7, /* number of directions of the edges of pieces in one simplex */
-    TET_SHAPES = 5
+    TET_SHAPES = 5       /* number of different shapes of the pieces of a tet */
 };
 
 /* Number of directions of the edges of pieces in a simplex, by its dimensions. */
@@ -75,7 +75,7 @@ typedef struct node_lists {
     int (*nodes)[4], (*fine)[4], (*lower)[4];
 } node_lists;
 
-/* Returns the index of a node in the list. */
+/* Returns the index of a node in the list of list_nodes(). node: barycentric coordinates times the order. */
 static int find_node(int dimensions, int order, const int node[4])
 {
     int at = node[1];
@@ -418,8 +418,8 @@ static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
     return out;
 }
 
-/* For each number of a tuple (x, y, z, value): upper bounds of u (`above`) and of -u (`below`), where u is the
- * difference defined at the top of the file, for m = 1. */
+/* Upper bounds of u (`above`) and of -u (`below`) for each element of a tuple (x, y, z, value). u is the difference
+ * defined at the top of the file, for m = 1. */
 typedef struct bound_sums {
     double above[SIZE], below[SIZE];
 } bound_sums;
@@ -465,7 +465,7 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
     multiply_by_matrices(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
-/* Computes position_bound and value_bound. */
+/* Computes job->position_bound and job->value_bound from the Bernstein coefficients. */
 static void bound_differences(bound_job *job)
 {
     bound_sums sums = {{0}, {0}};
@@ -538,8 +538,9 @@ static void find_gradients(bound_job *job)
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
 
-/* Returns the number of nodes of the finer lattice that have a gradient: all nodes, except those in the last layer of
- * pyramids, where the hex as which a pyramid is read is collapsed to a point. */
+/* Returns the number of nodes of the finer lattice at which the gradient is defined. Pyramids are read as hexes whose
+ * upper face is collapsed to the apex; the gradient is not defined at the nodes of this face, which are the last ones.
+ * In all other cells it is defined at all nodes. */
 static int count_gradients(const bound_job *job)
 {
     const session_bound_level *level = &job->of->levels[job->level];

@@ -80,8 +80,8 @@ static bool is_first_with_field(const session_parts *parts, int part, const sess
     return true;
 }
 
-/* Finds an error of a field on any part: the field's description is invalid, is missing, or differs from the
- * description on the first part that has the field. */
+/* Finds an error of a field on any of this rank's parts of a mesh: the field's description is invalid, the field is
+ * missing, or its description differs from that of `first`, the field on the first part that has it. */
 static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
@@ -172,7 +172,8 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* Errors of single blocks are included in the hash, because other ranks must be informed of them. */
+/* The hash includes the errors of fields on all of this rank's parts. A rank with such an error therefore has another
+ * hash than ranks without it, so that the tables are exchanged and all ranks receive the error. */
 uint64_t session_hash_names(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -351,9 +352,9 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
     return field;
 }
 
-/* Called after the last field of a mesh in the table of `rank` has been read. If that rank has cells of the mesh, marks
- * it (lacking_rank) as a rank without the field in each field of the mesh that its table does not list, and updates the
- * mesh's first_rank and has_ids. */
+/* Called after all fields of a mesh in the table of `rank` have been read. If that rank has cells of the mesh, updates
+ * the mesh's first_rank and has_ids, and stores `rank` as the lacking_rank of those fields of the mesh that its table
+ * does not list, unless they already have one. */
 static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;

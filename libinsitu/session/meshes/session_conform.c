@@ -38,8 +38,8 @@ static conform_array find_array(insitu_mesh *m, int number)
     }
 }
 
-/* Returns the type as which indices of the given type are read, in place or from a copy. below: upper bound of valid
- * indices. */
+/* Returns int32 or int64: the type in which indices of the given type are read, in place or from a copy. below: upper
+ * bound of valid indices. */
 static insitu_type choose_index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;
@@ -214,7 +214,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     mesh->conformed = made;
     mesh->original = *original;
     mesh->original.cell_type_map =
-        NULL; /* the description no longer refers to the caller's map, because copy_map() has copied it */
+        NULL; /* copy_map() has copied the caller's map, which need not stay valid after the call */
     mesh->given = given;
     mesh->given.cell_type_map = NULL;
     return INSITU_OK;

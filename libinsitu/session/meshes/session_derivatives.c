@@ -131,8 +131,9 @@ static void store_term(term_list *list, int position, double weight)
     list->count++;
 }
 
-/* Adds the terms that replace the term of a node that a serendipity cell lacks. `at` are the node's lattice indices.
- * There is one new term for each node from which its value is computed (see the top of this file). */
+/* Adds the terms of a node that a serendipity cell lacks. The value there is a weighted sum of values at other nodes
+ * (see the top of this file), so that one term is added for each of these nodes. at: lattice indices of the missing
+ * node. weight: the weight of its value in the derivative. */
 static void add_missing_term(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
@@ -207,8 +208,8 @@ static void add_derivative(term_list *list, const int at[3], int axis)
 
 /* ---- derivatives of cells of one type and number of nodes -------------------------------------------------------- */
 
-/* Lists the terms of the derivatives at all nodes. nodes_at: lattice indices of each node, in the order of the cell's
- * row of connectivity. */
+/* Lists the terms of the derivatives at all nodes. nodes_at: lattice indices of each node, in the order in which the
+ * cell's nodes are listed in the connectivity. */
 static void list_terms(term_list *list, const int (*nodes_at)[3])
 {
     session_derivatives *out = list->out;

@@ -12,8 +12,8 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* Indices in session_finer.counts, which the ranks reduce. The entries before LOBATTO count blocks by the highest order
- * of their cells; the entries named here count cells. */
+/* Indices in session_finer.counts, whose sums over all ranks are computed. Entry p below LOBATTO is the number of parts
+ * of the mesh whose cells have the highest order p. The entries named here are numbers of cells. */
 enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS, SERENDIPITY, SHELLS };
 _Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place");
 
@@ -67,7 +67,7 @@ static int64_t find_first_node(const finer_work *w, int64_t cell)
     return w->finer->offsets ? w->finer->offsets[cell] : cell * w->kinds[0][0].fine.count;
 }
 
-/* Returns the number of doubles that the values of a cell need while they are computed. */
+/* Returns the number of doubles that interpolate_cell() needs as its buffer. */
 static size_t find_buffer_size(const finer_work *w, int components)
 {
     size_t most = 0;
@@ -197,7 +197,8 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
     return is_made;
 }
 
-/* Frees the data that was computed for the nodes read so far. */
+/* Frees all data that was computed from the cells and nodes that the session has read until now. Called after
+ * mesh->given has been replaced by a description of other nodes. */
 static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
 {
     session_drop_cell_data(meshes, mesh);
@@ -306,7 +307,8 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
     }
 }
 
-/* Counts the cells of a mesh that is read as the caller gave it. */
+/* Counts the cells of a part, which must not have finer lattices, and stores the counts in mesh->finer. Returns false
+ * if memory runs out. */
 static bool count_mesh(session_mesh *mesh)
 {
     session_polynomials polynomials;

@@ -277,7 +277,7 @@ static bool list_all_sides(session_interpolation *out)
     return list_sides(out, quads) && list_sides(out, triangles) && list_sides(out, edges);
 }
 
-/* Returns whether fine nodes at the position `parts * i` of an axis have the value of the cell's node at i. */
+/* Returns whether node `parts * i` of the finer lattice, counted along an axis, coincides with node i of the cell. */
 static bool is_own_position(const session_interpolation *of, int parts, int i)
 {
     const double *row = of->line + parts * i * (of->of.order + 1);
@@ -286,7 +286,8 @@ static bool is_own_position(const session_interpolation *of, int parts, int i)
     return true;
 }
 
-/* Lists the fine nodes that are nodes of the cell: all of them if they are equispaced, and at least the corners. */
+/* Lists the cell's nodes that coincide with a node of the finer lattice. If the cell's nodes are equispaced, these are
+ * all of its nodes; otherwise at least its corners. */
 static bool list_own_nodes(session_interpolation *out, int parts)
 {
     const int p = out->of.order;
@@ -445,7 +446,7 @@ void session_complete_tuples(const session_interpolation *of, int components, co
     }
 }
 
-/* Computes all fine nodes from the lattice of the cell. */
+/* Computes the tuples at all nodes of the finer lattice from the tuples at the nodes of the cell's complete lattice. */
 static void fill_all_fine_nodes(const cell_job *job)
 {
     const session_interpolation *of = job->of;
@@ -497,8 +498,8 @@ static int choose_corner_numbering(const signed char *side, int corner_count, co
     return 2 * first + (ranks[(int)side[(first + corner_count - 1) % corner_count]] < next);
 }
 
-/* Computes the nodes of the finer lattice on all faces with the same number of corners, or on all edges. Those on a
- * face or edge are computed only from the cell's nodes on it. */
+/* Computes the tuples at the nodes of the finer lattice on all faces with the same number of corners, or on all edges.
+ * The tuples on a face or edge are computed only from those at the cell's nodes on this face or edge. */
 static void fill_side_nodes(const cell_job *job, const session_interpolation_sides *sides, const int ranks[8])
 {
     const session_interpolation *of = job->of;

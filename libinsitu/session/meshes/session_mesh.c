@@ -335,7 +335,7 @@ bool session_next_part(session_part_walk *walk)
     return false;
 }
 
-/* Frees the data that is derived from the cells. */
+/* Frees the data that the session has computed from the cells: outer surfaces, scalars, tree, topology, flat cells. */
 static void drop_derived_data(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);

@@ -256,8 +256,8 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     }
 }
 
-/* Returns the permutation, for the nodes of a cell of order 2 except its corners, that converts VTK's order to the
- * given one; NULL if both orders are the same. */
+/* Returns the permutation of the nodes other than corners between VTK's order and the given one, for cells of order 2:
+ * for each node in VTK's order, its position in the given order. NULL: both orders are the same. */
 static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};

@@ -89,7 +89,8 @@ static void list_tets(const pattern_list *list, int p)
             }
 }
 
-/* Node i, j of layer k + 1 is above the centre of the quad i .. i + 1, j .. j + 1 of layer k. */
+/* Lists the pieces of a pyramid of order p. Node i, j of layer k + 1 is above the centre of the quad in layer k whose
+ * first node is i, j. */
 static void list_pyramids(const pattern_list *list, int p)
 {
     for (int k = 0; k < p; k++)

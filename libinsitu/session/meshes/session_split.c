@@ -23,7 +23,7 @@ typedef struct split_work {
     session_rows rows;
     session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of cell (type and number of nodes) */
     bool is_of_type[LINEAR_TYPES];             /* for each linear type, set if some piece has this type */
-    int only_type;                             /* the type of all pieces; 0 if they differ */
+    int only_type;                             /* the type of all pieces; 0 if pieces have different types */
     /* first_pieces: for each cell, the index of its first piece; first_entries: for each cell, the index of its first
      * piece's first entry in piece_entries. A last element has the total. first_entries is NULL if all pieces have one
      * type. */

@@ -20,8 +20,8 @@ typedef struct linear_positions {
     int corner_count;
     int corners[8]; /* for each corner, its position in the cell's list of nodes in the connectivity */
     /* For equispaced nodes (index 0) and for Gauss-Lobatto points (index 1): for each node, in the order of the cell's
-     * list of nodes, the weights of the corners whose weighted mean is its position in the linear cell. NULL: cells of
-     * this type and order have no such nodes, or are not checked. */
+     * list of nodes, the weights of the corners; the weighted mean of the corners is the node's position in the linear
+     * cell. NULL: cells of this type and order cannot have such nodes, or are not checked. */
     double (*weights[2])[8];
 } linear_positions;
 

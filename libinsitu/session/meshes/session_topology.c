@@ -165,8 +165,8 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-/* value that stands for a cell of another rank, or for the missing cell of a face in the separate list of boundary
- * faces */
+/* Stands for a cell that this rank does not have: a halo cell, or the missing cell of a face in the caller's separate
+ * list of boundary faces. */
 static const int64_t outside = INT64_MIN;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given)
@@ -313,7 +313,8 @@ static int find_side_face(const face_ring *rings, int count, unsigned used, cons
     return -1;
 }
 
-/* Returns whether the face is the loop of the top vertices, starting at any of these vertices, in either direction. */
+/* Returns whether a face lists exactly the n vertices `top` in cyclic order, starting at any of them, in either
+ * direction. */
 static bool is_loop_of(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;

@@ -67,7 +67,8 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 
 /* ---- moving ------------------------------------------------------------------------------------------------------ */
 
-/* Returns the type of the moved coordinates. Missing z coordinates get the type of the x and y coordinates. */
+/* Returns the type of the moved coordinates along an axis. If the caller gives no z coordinates, the moved ones get the
+ * type of the x coordinates. */
 static insitu_type moved_type(const insitu_mesh *given, int axis)
 {
     if (session_has_axes(given)) return INSITU_FLOAT64;
