@@ -207,7 +207,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
     if (are_cells_changed) session_invalidate_homes(&s->catalogue);
-    if (scene->finer_pieces != 1) session_drop_ids(&s->meshes);
+    if (scene->finer_pieces != 1) session_drop_vertex_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team, &s->report, error);

@@ -286,7 +286,7 @@ bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool
     *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3,
                            .lattice = session_complete_nodes(type, of->order)};
     bool is_made = session_make_completion(of, order, &out->nodes) && make_levels(out);
-    if (is_pyramid && is_made) out->collapse = session_make_collapse(of->order);
+    if (is_pyramid && is_made) out->collapse = session_compute_collapse_matrix(of->order);
     is_made = is_made && (out->collapse || !is_pyramid);
     is_lobatto = is_lobatto && !is_pyramid;
     if (is_box || type == GRID_WEDGE) is_made = is_made && make_factor(out, 1, is_lobatto && is_box, &out->line);

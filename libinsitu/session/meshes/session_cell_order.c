@@ -118,7 +118,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
     const cell_rows rows = make_cell_rows(mesh);
     if (mesh->cells.cell_types && !has_reordered_cells(mesh)) return INSITU_OK;
     const int64_t largest = do_entries_fit_in_32_bits(&rows, threads) ? 0 : INT64_MAX;
-    if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
+    if (!session_allocate_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
 #pragma omp parallel num_threads(threads)
     {

@@ -581,7 +581,7 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
     }
     session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
-    insitu_status status = session_make_axes(mesh, error);
+    insitu_status status = session_compute_axis_coordinates(mesh, error);
     if (!status) status = check_mesh_cells(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
     if (!status || !mesh->warp.is_applied) return status;

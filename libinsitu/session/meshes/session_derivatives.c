@@ -292,13 +292,13 @@ static bool derive_finer_polynomials(const session_mesh *mesh, session_polynomia
 
 bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out)
 {
-    *out = (session_polynomials){.rows = session_rows_of(mesh),
+    *out = (session_polynomials){.rows = session_describe_rows(mesh),
                                  .first_pieces = mesh->topology.first_pieces,
                                  .cell_count = mesh->given.cell_count,
                                  .order = mesh->given.vertex_order};
     session_list_kinds(&out->rows);
     if (mesh->finer.parts) {
-        out->nodal = session_caller_rows(&mesh->finer.nodal);
+        out->nodal = session_describe_caller_rows(&mesh->finer.nodal);
         session_list_kinds(&out->nodal);
     }
     out->kinds = base_calloc((size_t)ROWS_MOST_KINDS * 2, sizeof *out->kinds);

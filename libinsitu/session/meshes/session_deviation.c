@@ -60,7 +60,7 @@ static bool begin_work(const session_mesh *mesh, const session_deviation_request
 {
     const insitu_mesh *nodal = session_nodal_mesh(mesh);
     bool is_made = true;
-    *w = (deviation_work){.rows = session_caller_rows(nodal),
+    *w = (deviation_work){.rows = session_describe_caller_rows(nodal),
                           .request = request,
                           .field_size = request->values ? request->values->component_count : 1};
     session_list_kinds(&w->rows);

@@ -38,7 +38,7 @@ static void end_work(finer_work *w)
 
 static bool begin_work(const session_finer *finer, const unsigned char *marks, finer_work *w)
 {
-    *w = (finer_work){.rows = session_caller_rows(&finer->nodal), .finer = finer, .marks = marks};
+    *w = (finer_work){.rows = session_describe_caller_rows(&finer->nodal), .finer = finer, .marks = marks};
     session_list_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
@@ -227,7 +227,7 @@ void session_end_finer_lattices(session_meshes *meshes)
 static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
-    session_rows rows = session_caller_rows(&finer->nodal);
+    session_rows rows = session_describe_caller_rows(&finer->nodal);
     int counts[ROWS_MOST_KINDS];
     bool is_same = true;
     session_list_kinds(&rows);
@@ -250,7 +250,7 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
     session_finer made = {.is_counted = true,
                           .parts = choice->parts > 1 || choice->is_completed ? choice->parts : 0,
                           .is_lobatto = choice->is_lobatto,
-                          .sizes = old->parts ? old->sizes : session_sizes_of(mesh),
+                          .sizes = old->parts ? old->sizes : session_get_sizes(mesh),
                           .given_counts = mesh->given_counts};
     memcpy(made.counts, old->counts, sizeof made.counts);
     if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
@@ -283,7 +283,7 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
 
 /* ---- choices ----------------------------------------------------------------------------------------------------- */
 
-void session_drop_ids(const session_meshes *meshes)
+void session_drop_vertex_ids(const session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
         insitu_mesh *given = &meshes->items[i]->given;
@@ -428,7 +428,7 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
                                session_finer_bytes out[FINER_MOST_PARTS + 1])
 {
     const insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
-    session_rows rows = session_caller_rows(nodal);
+    session_rows rows = session_describe_caller_rows(nodal);
     int64_t counts[ROWS_MOST_KINDS][2] = {{0}};
     session_list_kinds(&rows);
     for (int64_t cell = 0; cell < nodal->cell_count; cell++)

@@ -14,7 +14,7 @@
 
 /* Removes the caller's vertex ids from meshes with cells of higher order, since finer lattices have none. This must be
  * done before the catalogue is updated. Local. */
-void session_drop_ids(const session_meshes *meshes);
+void session_drop_vertex_ids(const session_meshes *meshes);
 
 /* Maximum number of parts of an edge between two nodes. Lattices have at most the order NODES_MOST_ORDER, which limits
  * cells of order 3 and more further. */

@@ -159,7 +159,7 @@ static bool fill_pyramid_weights(int p, int parts, double *out)
     return convert_rows(p, session_complete_nodes(GRID_PYRAMID, parts * p).count, out);
 }
 
-double *session_make_collapse(int p)
+double *session_compute_collapse_matrix(int p)
 {
     const int columns = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
     double *out = base_alloc((size_t)rows * (size_t)columns * sizeof *out);

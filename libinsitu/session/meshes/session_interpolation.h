@@ -67,7 +67,7 @@ bool session_make_completion(const session_nodes *of, insitu_vertex_order order,
 /* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order
  * p whose upper face is collapsed to the apex. A pyramid's functions are polynomials of order p along each axis of that
  * hex. Returns NULL if memory runs out; the caller must free the result by base_free(). */
-double *session_make_collapse(int p);
+double *session_compute_collapse_matrix(int p);
 
 /* Copies tuples at the cell's nodes, which are in the order of the nodes in connectivity, into the order of `complete`,
  * and computes the tuples at nodes that a serendipity cell lacks. */

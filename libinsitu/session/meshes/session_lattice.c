@@ -324,7 +324,7 @@ void session_copy_lattice(session_mesh *mesh)
     out->has_ghosts = !has_all || out->cell_count != mesh->given.cell_count;
 }
 
-void session_read_lattice(session_mesh *mesh, grid *g)
+void session_set_lattice_of_grid(session_mesh *mesh, grid *g)
 {
     const insitu_lattice *l = mesh->given.lattice;
     if (!l || are_all_zero(l->cells)) return;
@@ -344,7 +344,7 @@ void session_fill_axis(const insitu_lattice *l, int axis, double *out)
     }
 }
 
-insitu_status session_make_axes(session_mesh *mesh, base_error *error)
+insitu_status session_compute_axis_coordinates(session_mesh *mesh, base_error *error)
 {
     session_lattice *own = &mesh->lattice;
     session_drop_axes(own);

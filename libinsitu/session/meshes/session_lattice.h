@@ -23,13 +23,13 @@ void session_copy_lattice(session_mesh *mesh);
 
 /* If the mesh has a lattice, makes its grid compute the vertices of cells from the lattice: sets the cell type, the
  * lattice and, unless coordinates are given by vertex, the coordinates. */
-void session_read_lattice(session_mesh *mesh, grid *g);
+void session_set_lattice_of_grid(session_mesh *mesh, grid *g);
 
 /* Computes the cells[axis] + 1 coordinates along an axis of a lattice that is uniform or rectilinear. Local. */
 void session_fill_axis(const insitu_lattice *lattice, int axis, double *out);
 
 /* Computes session_lattice.axis_coordinates from the current contents of the caller's arrays. Does nothing if the
  * lattice's coordinates are given by vertex. Fails if a coordinate is not finite. Local. */
-insitu_status session_make_axes(session_mesh *mesh, base_error *error);
+insitu_status session_compute_axis_coordinates(session_mesh *mesh, base_error *error);
 
 #endif

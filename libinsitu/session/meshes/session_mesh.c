@@ -67,8 +67,8 @@ grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *arr
     return out;
 }
 
-bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
-                          base_error *error)
+bool session_allocate_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest,
+                              grid_array *out, base_error *error)
 {
     const bool is_wide = largest > INT32_MAX;
     const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);

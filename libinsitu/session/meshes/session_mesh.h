@@ -473,8 +473,8 @@ grid session_caller_grid(const insitu_mesh *mesh);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
  * if memory runs out; the error then names the mesh and `what`, the purpose of the indices. */
-bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
-                          base_error *error);
+bool session_allocate_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest,
+                              grid_array *out, base_error *error);
 
 static inline void session_store_index(const grid_array *array, int64_t i, int64_t value)
 {
@@ -600,7 +600,7 @@ static inline int64_t session_cell_count(const session_mesh *mesh)
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
 }
 
-static inline session_sizes session_sizes_of(const session_mesh *mesh)
+static inline session_sizes session_get_sizes(const session_mesh *mesh)
 {
     const double *low = mesh->lower, *high = mesh->upper;
     return (session_sizes){

@@ -54,7 +54,7 @@ static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, ses
 {
     const insitu_mesh *nodal = session_nodal_mesh(mesh);
     bool is_made = true;
-    *w = (piece_work){.rows = session_caller_rows(nodal), .set = set};
+    *w = (piece_work){.rows = session_describe_caller_rows(nodal), .set = set};
     session_list_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         is_made = make_piece_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);

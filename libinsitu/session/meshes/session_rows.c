@@ -1,15 +1,15 @@
 #include "session_rows.h"
 
-session_rows session_caller_rows(const insitu_mesh *given)
+session_rows session_describe_caller_rows(const insitu_mesh *given)
 {
     const int64_t nodes = session_count_cell_nodes(given), row = given->connectivity_row;
     return (session_rows){
         .cells = session_caller_grid(given), .nodes_per_cell = nodes, .row_stride = row ? row : nodes};
 }
 
-session_rows session_rows_of(const session_mesh *mesh)
+session_rows session_describe_rows(const session_mesh *mesh)
 {
-    session_rows rows = session_caller_rows(&mesh->given);
+    session_rows rows = session_describe_caller_rows(&mesh->given);
     rows.is_discontinuous = mesh->discontinuous.is_active;
     return rows;
 }

@@ -29,9 +29,9 @@ typedef struct session_rows {
 
 /* Describes the rows of a mesh, whose description must be valid. The list of kinds is left empty
  * (session_list_kinds()). */
-session_rows session_rows_of(const session_mesh *mesh);
+session_rows session_describe_rows(const session_mesh *mesh);
 /* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is left empty. */
-session_rows session_caller_rows(const insitu_mesh *given);
+session_rows session_describe_caller_rows(const insitu_mesh *given);
 
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
 {

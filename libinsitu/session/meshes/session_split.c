@@ -46,7 +46,7 @@ bool session_has_higher_order(const insitu_mesh *given)
     return cell < given->cell_count;
 }
 
-int64_t session_entry_index(const insitu_mesh *given, int64_t entry)
+int64_t session_find_connectivity_index(const insitu_mesh *given, int64_t entry)
 {
     const int64_t used = session_count_cell_nodes(given), row = given->connectivity_row;
     return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
@@ -365,9 +365,9 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     t->connectivity_count = entries;
     for (int i = 0; i < w->rows.kind_count; i++)
         t->depends_on_coordinates = t->depends_on_coordinates || w->patterns[i].polygon_count;
-    if (!session_make_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
+    if (!session_allocate_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
         return error->status;
-    if (w->first_entries && !session_make_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
+    if (w->first_entries && !session_allocate_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
         return error->status;
     t->parents = base_alloc((size_t)(pieces + 1) * sizeof *t->parents);
     if (w->first_entries) t->cell_types = base_alloc((size_t)pieces + 1);
@@ -396,7 +396,7 @@ static void end_split(split_work *w)
 
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
 {
-    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh), .set = &mesh->finer.pieces};
+    split_work w = {.mesh = mesh, .rows = session_describe_rows(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
     if (!status) status = check_indices(&w, threads, error);
     if (!status) status = count_all_pieces(&w, threads, error);
@@ -407,13 +407,13 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
 
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
 {
-    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh), .set = &mesh->finer.pieces};
+    split_work w = {.mesh = mesh, .rows = session_describe_rows(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_count_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
     const int64_t largest = w.rows.cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
     w.stores_entries = true;
     if (!status) status = count_all_pieces(&w, threads, error);
-    if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
+    if (!status && !session_allocate_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
         status = error->status;
     w.piece_entries = *out;
     if (!status) store_cells(&w, threads);

@@ -18,7 +18,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
 
 /* Returns the index of an entry in the caller's connectivity. `entry` is its index if the unused entries at the end of
  * each cell's row are not counted. */
-int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
+int64_t session_find_connectivity_index(const insitu_mesh *given, int64_t entry);
 
 /* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat. It is inverted
  * if at least one of its pieces is inverted; inverted cells are counted only if any_inverted is set. Local. */

@@ -80,7 +80,7 @@ static bool make_linear_positions(const session_nodes *of, insitu_vertex_order o
 
 static bool begin_work(const insitu_mesh *given, straight_work *w)
 {
-    *w = (straight_work){.rows = session_caller_rows(given)};
+    *w = (straight_work){.rows = session_describe_caller_rows(given)};
     session_list_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)

@@ -337,7 +337,7 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
 /* Sums up cells begin .. end - 1 a second time, testing each cell with its own bounding box. This is needed only if the
  * smallest volume is so small, compared to the common bounding box of these cells, that a cell may be flat. Computing
  * each cell's box in the first pass would take a thirtieth of its time for a mesh of tets. */
-static mesh_tally tally_run_again(const grid *g, int64_t begin, int64_t end)
+static mesh_tally tally_cells_with_own_boxes(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
     for (int64_t cell = begin; cell < end; cell++) tally_cell(g, cell, &again);
@@ -458,7 +458,7 @@ MMBVH_INLINE int64_t tally_cells(const session_mesh *mesh, int64_t begin, int64_
         alike.first_entry += (taken + alone) * grid_type_vertices(alike.type);
         alike.count -= taken + alone;
     }
-    if (may_be_flat(&t, least)) t = tally_run_again(&mesh->cells, begin, cell);
+    if (may_be_flat(&t, least)) t = tally_cells_with_own_boxes(&mesh->cells, begin, cell);
     tally_merge(tally, &t);
     return cell;
 }

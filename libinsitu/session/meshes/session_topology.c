@@ -68,7 +68,7 @@ void session_select_grid_arrays(session_mesh *mesh)
         g.ghosts = (const char *)mesh->covered;
         g.ghosts_stride = g.ghosts_bytes = 1;
     }
-    session_read_lattice(mesh, &g);
+    session_set_lattice_of_grid(mesh, &g);
     g.flat = mesh->flat_cells;
     mesh->cells = g;
 }
@@ -143,8 +143,8 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
     const long long base = given->index_base;
     int64_t at = 0;
     t->has_own_faces = true;
-    if (total < 0 || !session_make_indices(mesh, "faces' offsets", count, total, &t->face_offsets, error) ||
-        !session_make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
+    if (total < 0 || !session_allocate_indices(mesh, "faces' offsets", count, total, &t->face_offsets, error) ||
+        !session_allocate_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
     for (int64_t face = 0; face < count; face++) {
         const session_face_row row = session_locate_caller_face(given, face);
@@ -257,12 +257,12 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     const int64_t faces = session_face_count(given), most = faces + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;
-    if (!session_make_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error))
+    if (!session_allocate_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error))
         return error->status;
     if (count_faces(mesh, &sides, &t->offsets, error)) return error->status;
     int64_t total = 0;
     for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
-    if (!session_make_indices(mesh, "cells' faces", total, faces, &t->connectivity, error)) return error->status;
+    if (!session_allocate_indices(mesh, "cells' faces", total, faces, &t->connectivity, error)) return error->status;
     store_faces(mesh, &sides, t);
     t->connectivity_count = total;
     t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
@@ -517,10 +517,10 @@ static insitu_status store_recognised_cells(session_mesh *mesh, recognition *r, 
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
     const int type = find_common_type(r, count), size = grid_type_vertices(type);
     grid_array offsets = {0}, connectivity;
-    if (!session_make_indices(mesh, "recognised cells", r->entry_count, vertices > faces ? vertices : faces,
-                              &connectivity, error))
+    if (!session_allocate_indices(mesh, "recognised cells", r->entry_count, vertices > faces ? vertices : faces,
+                                  &connectivity, error))
         return error->status;
-    if (!type && !session_make_indices(mesh, "recognised cells' offsets", count, r->entry_count, &offsets, error)) {
+    if (!type && !session_allocate_indices(mesh, "recognised cells' offsets", count, r->entry_count, &offsets, error)) {
         session_drop_array(&connectivity);
         return error->status;
     }

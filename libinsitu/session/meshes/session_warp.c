@@ -152,7 +152,7 @@ static insitu_status compute_coordinates(session_mesh *mesh, const session_displ
     if (!reserve_coordinates(mesh, by->component_count, differ))
         return session_fail_for_memory(error, mesh->given.vertex_count * 24, "coordinates of a warped mesh");
     const bool has_axes = session_has_axes(&mesh->given);
-    insitu_status status = has_axes ? session_make_axes(mesh, error) : INSITU_OK;
+    insitu_status status = has_axes ? session_compute_axis_coordinates(mesh, error) : INSITU_OK;
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
         const insitu_array *own = &mesh->warp.coordinates[axis];

@@ -51,7 +51,7 @@ static void describe_grid(const session_rows *rows, int64_t vertices, session_co
 
 bool session_corner_cells_create(const session_mesh *mesh, session_corner_cells *out)
 {
-    session_rows rows = session_rows_of(mesh);
+    session_rows rows = session_describe_rows(mesh);
     int corners[ROWS_MOST_KINDS][8];
     int64_t vertices = 0;
     *out = (session_corner_cells){.origins = NULL};

@@ -50,7 +50,7 @@ static bool make_rim_kind(const session_nodes *of, insitu_vertex_order order, se
 
 bool session_rims_create(const session_mesh *mesh, session_rims *out)
 {
-    *out = (session_rims){.rows = session_rows_of(mesh), .cell = -1};
+    *out = (session_rims){.rows = session_describe_rows(mesh), .cell = -1};
     session_list_kinds(&out->rows);
     out->kinds = base_calloc((size_t)out->rows.kind_count, sizeof *out->kinds);
     out->faces_of_vertex = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);

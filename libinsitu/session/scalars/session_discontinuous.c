@@ -45,7 +45,7 @@ static int64_t find_shared_vertex_of_corner(const session_discontinuous *vertice
                                             int64_t corner)
 {
     if (vertices->are_corners_entries)
-        return grid_array_index(&vertices->shared_connectivity, session_entry_index(given, corner));
+        return grid_array_index(&vertices->shared_connectivity, session_find_connectivity_index(given, corner));
     return grid_array_index(&vertices->shared_connectivity, grid_array_index(&vertices->corners, corner));
 }
 
@@ -105,8 +105,8 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
         vertices->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
         return session_split_entries(mesh, threads, &vertices->corners, error);
     }
-    if (!session_make_indices(mesh, "cells' corners", vertices->corner_count, vertices->corner_count,
-                              &vertices->corners, error))
+    if (!session_allocate_indices(mesh, "cells' corners", vertices->corner_count, vertices->corner_count,
+                                  &vertices->corners, error))
         return error->status;
     for (int64_t i = 0; i < vertices->corner_count; i++) session_store_index(&vertices->corners, i, i);
     session_permute_cells(mesh, vertices->corner_count, threads, &vertices->corners);

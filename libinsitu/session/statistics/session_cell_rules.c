@@ -207,7 +207,7 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                                 .line_count = type == GRID_HEX                          ? 2
                                               : type == GRID_QUAD || type == GRID_WEDGE ? 1
                                                                                         : 0};
-    if (is_pyramid) out->collapse = session_make_collapse(of->order);
+    if (is_pyramid) out->collapse = session_compute_collapse_matrix(of->order);
     return session_make_completion(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
            (!has_straight || weigh_corners(has_spacing, out)) &&
            make_rule(&nodes, out->line_count, has_spacing, true, &out->bent) &&

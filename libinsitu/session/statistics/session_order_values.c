@@ -315,8 +315,8 @@ static bool begin_pass(order_pass *p)
 {
     const session_mesh *mesh = p->of->mesh;
     bool is_made = true;
-    p->rows = session_caller_rows(session_nodal_mesh(mesh));
-    p->lattice = session_rows_of(mesh);
+    p->rows = session_describe_caller_rows(session_nodal_mesh(mesh));
+    p->lattice = session_describe_rows(mesh);
     session_list_kinds(&p->rows);
     for (int i = 0; i < p->rows.kind_count && is_made; i++) {
         const session_nodes *nodes = &p->rows.kinds[i].nodes;
