@@ -20,8 +20,10 @@
 
 enum change_word {
     CYCLE_HIGH,
-    CYCLE_LOW, /* lowest cycle, negated (as are all entries named _LOW), because the reduction is a maximum */
-    FAILED,    /* number of ranks minus the lowest failing rank; 0: no rank has failed */
+    /* complement of the lowest cycle; entries named _LOW are complements or negated numbers, because the reduction is a
+     * maximum */
+    CYCLE_LOW,
+    FAILED, /* number of ranks minus the lowest failing rank; 0: no rank has failed */
     CELLS_CHANGED,
     LEVELS_CHANGED,
     NAMES_CHANGED,

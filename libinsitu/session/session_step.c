@@ -234,8 +234,9 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
     return status;
 }
 
-/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: the error
- * of a failed insitu_set_*() call. Images that do not use a faulty mesh or field are drawn, and the error is returned
+/* Performs the phases of a step in which images, statistics or conditions are due. Only data that the plan uses is
+ * computed. refused: the error of a failed insitu_set_*() call; if there is none, receives the first error of a mesh or
+ * field that this step finds. Images that do not use a mesh or field with an error are drawn, and *refused is returned
  * afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *refused, base_error *error)

@@ -63,7 +63,7 @@ typedef enum session_warning_kind {
     /* a layer averages values over several meshes, but the vertices of one mesh have global ids and are not matched
      * with those of the others */
     WARNING_APART,
-    WARNING_NO_LINES, /* a mesh lacks the field of a layer's contour lines */
+    WARNING_NO_LINES, /* a mesh does not have the field of a layer's contour lines */
     WARNING_SHELLS,   /* a layer that needs cells with volume is drawn on a mesh that has only shells */
     WARNING_SAMPLES,  /* several volumes are sampled at the default distance, without an error bound */
     WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
@@ -71,7 +71,7 @@ typedef enum session_warning_kind {
     WARNING_NARROW,
     WARNING_REPLACED,  /* a picture overwrites an earlier one */
     WARNING_VIEW,      /* a camera sees no cell */
-    WARNING_GREY,      /* a surface lacks the field that colours it */
+    WARNING_GREY,      /* a mesh does not have the field that colours its surface */
     WARNING_OVERLAP,   /* cells overlap in some pixels */
     WARNING_WORDS,     /* a text of a picture cannot be drawn as written */
     WARNING_BARS,      /* pictures that should share their colour bars have different ones */

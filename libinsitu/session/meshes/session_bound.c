@@ -480,8 +480,9 @@ static void bound_differences(bound_job *job)
     job->value_bound = largest[3];
 }
 
-/* Finds a sphere around the box of the Bernstein coefficients of positions. It contains the cell, because positions are
- * weighted means of these. The radius is NaN if a coefficient is not finite. */
+/* Finds a sphere around the bounding box of the positions' Bernstein coefficients. The sphere contains the cell,
+ * because each position in the cell is a weighted mean of these coefficients. Its radius is NaN if a coefficient is not
+ * finite. */
 static void find_sphere(const bound_job *job, session_cell_bound *out)
 {
     double low[SIZE], high[SIZE], half[3], zero = 0;

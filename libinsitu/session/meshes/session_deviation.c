@@ -76,8 +76,8 @@ static void end_work(deviation_work *w)
     for (int i = 0; i < w->rows.kind_count; i++) session_drop_bound(&w->bounds[i]);
 }
 
-/* Returns the number of doubles that a cell needs: a tuple of the field, values and tuples at nodes, and working
- * memory. */
+/* Returns the number of doubles in a thread's buffer, which contains one tuple of the field, the values at a cell's
+ * nodes, the tuples (x, y, z, value) at these nodes, and working memory. */
 static size_t find_buffer_size(const deviation_work *w)
 {
     size_t most = 0;
@@ -89,7 +89,9 @@ static size_t find_buffer_size(const deviation_work *w)
     return most + (size_t)w->field_size;
 }
 
-/* Returns whether an isosurface or the plane may cross the cell, and marks it. */
+/* Returns whether the cell is measured: an isosurface or the plane may cross it, or the request measures cells
+ * regardless of crossings. Marks the cell if it may be crossed. If the request has a field or a plane, the values at
+ * the cell's nodes are stored in the buffer. */
 static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer)
 {
     const session_deviation_request *request = w->request;
@@ -103,7 +105,8 @@ static bool may_cross(const deviation_work *w, const session_bound *of, int64_t 
     return true;
 }
 
-/* Computes the bound of a cell whose values have been read. */
+/* Computes the bounds of a cell. If the request has a field, may_cross() must have stored the cell's values in the
+ * buffer. */
 static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, int level,
                                      double *buffer)
 {
@@ -139,7 +142,8 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
     return least;
 }
 
-/* Extends the range in *out by a cell's values, and passes the cell to the request's function. */
+/* Extends the range in *out by the cell's values, which may_cross() has stored in the buffer, and passes the cell to
+ * the request's use_cell(). */
 static void measure_values(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer,
                            session_deviation *out)
 {

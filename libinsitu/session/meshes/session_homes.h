@@ -6,7 +6,7 @@
  * If items are identified by coordinates, which are bitwise equal on all ranks, the home is one of the ranks in whose
  * box all of the item's vertices lie; a hash of the item selects one of them. If items are identified by global ids,
  * their coordinates may differ in the last bits, so the ids are divided among the ranks instead. With P ranks, the
- * range of ids of rank r starts at the r-th of P quantiles of the ids of its own vertices. This range is near the
+ * range of ids of rank r starts at the (r + 1/2) / P quantile of the ids of its own vertices. This range is near the
  * rank's own ids if ranks number their vertices consecutively, and the ranges are evenly distributed if ids are
  * random. */
 #ifndef SESSION_HOMES_H

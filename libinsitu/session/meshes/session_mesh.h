@@ -110,8 +110,8 @@ typedef struct session_scalar {
     bool are_values_stale;    /* set if recentred values must be computed again */
     bool may_have_changed;    /* set if the caller has set the field again, so that the values may have changed */
     bool has_checksum;        /* set if the checksums below have been computed */
-    uint64_t checksum;        /* checksum of all values at the last picture */
-    uint64_t sample_checksum; /* checksum of a few of the values */
+    uint64_t checksum;        /* checksum of all values when they were last compared */
+    uint64_t sample_checksum; /* checksum of a few of the values, to detect changes that the caller does not declare */
     int64_t version;          /* number of times that a checksum has shown that the values have changed */
     bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
     float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */

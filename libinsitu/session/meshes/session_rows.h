@@ -15,8 +15,8 @@ typedef struct session_row_kind {
 } session_row_kind;
 
 typedef struct session_rows {
-    /* the caller's cells. If they have no connectivity, each of its entries is a vertex of its own: entry i refers to
-     * vertex i */
+    /* the caller's cells. If the caller gives no connectivity, the cells are read as if entry i of the connectivity
+     * were vertex i. */
     grid cells;
     /* Used if cells have no offsets. nodes_per_cell: number of nodes of each cell; row_stride: number of entries from
      * the first node of a cell to the first node of the next cell. */

@@ -211,7 +211,7 @@ typedef struct piece_walk {
 static piece_walk begin_piece_walk(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
-    /* Pyramids have no words. Their pieces have two types, and all of them are made. */
+    /* The words of pyramids are not read: all pieces of a pyramid are made, because they have two types. */
     const bool has_words = first && first[cell] < first[cell + 1] && of->nodes.type != GRID_PYRAMID;
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }

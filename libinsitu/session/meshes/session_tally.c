@@ -238,7 +238,8 @@ MMBVH_INLINE bool read_points(const grid *g, int64_t first, int count, bool is_g
     return is_ghost || poison == 0;
 }
 
-/* Adds one cell to the sums. Returns false if the cell is bad. */
+/* Adds one cell to the sums, and lowers *least to the cell's absolute volume if that is smaller. Returns false, without
+ * adding anything, if the cell is invalid. */
 MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
                                  const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
@@ -315,8 +316,9 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to the sums with vectorized code. Returns the number of cells that were added. *alone
- * receives the number of following cells that must be added one by one. */
+/* Adds the first cells of the run to the sums with vectorized code, and lowers *least to the smallest absolute volume
+ * of these cells. Returns the number of cells that were added. *alone receives the number of following cells that must
+ * be added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
