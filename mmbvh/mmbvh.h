@@ -172,10 +172,10 @@ typedef struct mmbvh_visible {
     const mmbvh_interval *intervals;
 } mmbvh_visible;
 
-/* Does the same as mmbvh_refit_bounds(), but may skip nodes that are in none of the visible parts. *is_whole is set to
- * true if no node was skipped. Otherwise the bounds of a node contain only its visible descendants, and are valid only
- * until values, intervals or vertices change. A traversal that skips invisible nodes finds the same cells as before,
- * but mmbvh_check() fails. */
+/* Computes the bounds from moved vertices of the same cells. Nodes that are in none of the visible parts may be
+ * skipped. *is_whole is set to true if no node was skipped. Otherwise the bounds of a node contain only its visible
+ * descendants, and are valid only until values, intervals or vertices change. A traversal that skips invisible nodes
+ * then finds the same cells as after mmbvh_refit_bounds(), but mmbvh_check() fails. */
 insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
                                          const mmbvh_options *options, bool *is_whole);
 

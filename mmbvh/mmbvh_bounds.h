@@ -10,7 +10,8 @@
  * to the tree's coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
-/* Does the same as bounds_read for coordinates that are floats. */
+/* Reads the boxes of `count` cells as boxes of floats, without transforming them to the tree's coordinates. Used only
+ * if all coordinates are floats. */
 typedef void bounds_read_float_boxes(const bounds_source *source, const uint32_t *cells, int count,
                                      fetch_float_box *float_boxes);
 

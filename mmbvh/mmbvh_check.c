@@ -16,12 +16,12 @@ typedef struct check_state {
     unsigned char *visited; /* bit set of the cells visited so far */
     int64_t cell_limit; /* number of cells of the grid, or number of meshes if the tree is a parent tree over the boxes
                            of meshes */
-    int64_t next_pair;  /* index of the pair of nodes that must be reached next */
-    int64_t next_entry;
-    int64_t unusable; /* number of drawn cells with a value that is not finite */
-    int64_t leaves;   /* number of leaves visited so far */
-    int depth;        /* largest depth of a node visited so far */
-    double overlap;   /* sum of the overlaps of siblings */
+    int64_t next_pair;  /* index of the first node of the pair of siblings that the traversal must reach next */
+    int64_t next_entry; /* index in mmbvh.cells of the cell that the traversal must reach next */
+    int64_t unusable;   /* number of drawn cells with a value that is not finite */
+    int64_t leaves;     /* number of leaves visited so far */
+    int depth;          /* largest depth of a node visited so far */
+    double overlap;     /* sum of the overlaps of siblings */
     base_error *error;
 } check_state;
 

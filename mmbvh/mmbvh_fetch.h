@@ -81,8 +81,8 @@ MMBVH_INLINE void prefetch_later_cell(const grid *g, int64_t cell, const fetch_s
     prefetch_connectivity(g, fetch_first_entry(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
 }
 
-/* Returns whether an array's numbers are contiguous, so that code can use a constant stride in its address
- * computations. */
+/* Returns whether the elements of an array follow each other without gaps. The stride is then the size of an element,
+ * which is a constant in specialized code. */
 static inline bool fetch_is_contiguous(const grid_array *a)
 {
     return a->stride == (a->is_wide ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
@@ -314,8 +314,8 @@ MMBVH_INLINE void round_box_outward(const fetch_box *box, const double origin[3]
     }
 }
 
-/* Does the same as round_box_outward() for a box of floats; the results are bit-identical. Lane 3 of the input is
- * ignored. */
+/* Transforms a box of floats to the tree's coordinates and rounds it outward. The results are bit-identical to those of
+ * round_box_outward() for the same box in double. Lane 3 of the input is ignored. */
 MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, const double origin[3], double scale,
                                           vec4 *lower, vec4 *upper)
 {
@@ -418,8 +418,8 @@ static inline void extend_box_by_any_cell(fetch_box *box, const grid *g, int64_t
     }
 /* clang-format on */
 
-/* Does the same as FETCH_INSTANCES for floats only. The table of the instances is FETCH_FLOAT_TABLE(prefix), indexed by
- * [shape][wide_index]. */
+/* Instantiates a function for each cell shape and index type, for coordinates or values that are floats. The table of
+ * the instances is FETCH_FLOAT_TABLE(prefix), indexed by [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
     FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)

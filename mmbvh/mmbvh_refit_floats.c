@@ -5,9 +5,10 @@
 #include "mmbvh_measure.h"
 
 enum {
-    PART_NODES = 256,                                   /* maximum number of nodes whose cells are read in one pass */
-    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells of PART_NODES nodes; of a pair and
-                                                           its descendants, half of the nodes plus one are leaves */
+    PART_NODES = 256, /* maximum number of nodes whose cells are read in one pass */
+    /* maximum number of cells in PART_NODES nodes: if two siblings and their descendants are n nodes together, n / 2 +
+     * 1 of them are leaves */
+    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF,
     PREFETCH_CELLS = 64,
     PREFETCH_VERTICES = 24
 };

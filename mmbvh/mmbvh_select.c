@@ -164,7 +164,8 @@ static uint64_t mask_drawn_cells(const grid *g, int64_t first, int64_t count)
 
 typedef match_result (*const matcher)(const selector *s, int64_t cell, const bool is_packed);
 
-/* Sets the bits of cells of any type. Cells that are not drawn are skipped. */
+/* Sets the bits of the cells in [begin, end) that match the query. The cells may have any types. Cells that are not
+ * drawn are skipped. Returns the number of cells with non-finite values. */
 MMBVH_INLINE int64_t mark_matching_cells(const selector *s, int64_t begin, int64_t end, matcher match,
                                          const bool is_packed)
 {
@@ -183,7 +184,8 @@ MMBVH_INLINE int64_t mark_matching_cells(const selector *s, int64_t begin, int64
     return unusable;
 }
 
-/* Does the same as mark_matching_cells(), four cells at a time. All cells must have the same type. */
+/* Sets the bits of the cells that match the query, four cells at a time. All cells must have the same type. Returns the
+ * number of cells with non-finite values. */
 MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t end, matcher match,
                                        const pass_constants pass)
 {
@@ -268,8 +270,8 @@ static uint64_t match_cells_of_row(const selector *s, const rows_ranges *r)
     return pack_bytes_into_bits(intersects, r->count);
 }
 
-/* Sets the bits of a lattice's cells, row by row. The bits of a row may fall into two words; only this thread writes to
- * either of them. */
+/* Sets the bits of the cells of a lattice in [begin, end) that match the query, row by row. The bits of a row may lie
+ * in two words of the bit set; no other thread writes to these words. */
 static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
 {
     const grid *g = s->g;
@@ -306,8 +308,8 @@ static selector make_selector(const grid *g, const mmbvh_query *query, uint64_t 
     return s;
 }
 
-/* Maximum number of cells of a grid whose whole value range is computed first. Small lattices are read quickly, and
- * often contain no matching cell. */
+/* If a lattice has at most this number of cells, the range of all its values is computed before the ranges of single
+ * cells are. This takes little time, and often shows that no cell matches the query. */
 enum { MOST_READ_TWICE = 1 << 16 };
 
 /* Returns whether the range of all values shows that a small lattice has no matching cell and no non-finite value. */

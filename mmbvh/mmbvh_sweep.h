@@ -52,7 +52,8 @@ sweep_sum sweep_tree(const sweep *s, int threads);
 /* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
-/* Does the same as sweep_of_ranges() for a parent tree. `ranges` has a low and a high value per mesh. */
+/* Returns a sweep that computes the ranges of a parent tree, whose leaves contain the boxes of meshes instead of cells.
+ * `ranges` has a low and a high value per mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
 /* Returns a sweep that computes the bounds. */

@@ -52,7 +52,8 @@ static inline float vec4_max_lane(vec4 a)
     return two[0] > two[1] ? two[0] : two[1];
 }
 
-/* Vectors of two doubles, with the same rules for NaN. */
+/* Vectors of two doubles. Like vec4_min() and vec4_max(), vec2_min() and vec2_max() ignore a NaN in their first
+ * argument. */
 typedef double vec2 __attribute__((vector_size(16), may_alias));
 typedef int64_t ivec2 __attribute__((vector_size(16), may_alias));
 

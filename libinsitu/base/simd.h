@@ -320,7 +320,8 @@ SIMD_INLINE vf vf_floor(vf a)
 #endif
 
 #if !defined(SIMD_AVX2)
-/* memcpy() allows callers to gather integers as floats of the same bits. */
+/* Returns base[index] per lane. The elements are copied by memcpy(), because some callers gather arrays of integers,
+ * and interpret the bits of the result as integers again. */
 SIMD_INLINE vf vf_gather(const float *base, vi index)
 {
     float v[SIMD_WIDTH];

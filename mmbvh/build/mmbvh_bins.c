@@ -115,8 +115,9 @@ static inline vec4 compute_three_half_areas(const lanes boxes[3])
            vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
 
-/* Returns the SAH costs of one side of three planes, one per axis in lanes 0 to 2: half the surface area of the side's
- * box times the number of its items. The cost of an empty side is NaN, which never compares as the smallest. */
+/* Returns the SAH costs of one side of a plane, for three planes: lane k (0 to 2) belongs to a plane perpendicular to
+ * axis k. The cost is half the surface area of the box of the items on that side, times the number of these items. The
+ * cost of an empty side is NaN, which never compares as the smallest. */
 static inline vec4 compute_side_costs(const lanes boxes[3], ivec4 counts)
 {
     return (vec4)((ivec4)(compute_three_half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));

@@ -11,7 +11,9 @@
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
-    DIGIT_BITS = 11, /* log2 of the number of output streams; their write positions fit in a core's cache */
+    /* maximum number of bits of a radix sort digit; a core's cache has space for the write position of each value of
+     * the digit */
+    DIGIT_BITS = 11,
     DIGITS = 1 << DIGIT_BITS,
     /* number of chunks per thread; there are several, so that other threads can take chunks of a delayed one */
     SORT_CHUNKS = 4,
@@ -21,7 +23,9 @@ enum {
     SORT_LARGE = 16,
     SORT_LARGE_MIN = 16384,
     SORT_INSERTED = 24, /* groups with at most this many keys are sorted by insertion */
-    SORT_LEFT_BITS = 2  /* log2 of the number of keys per digit, if they are spread evenly */
+    /* sort_serial() chooses digits of so many bits that, if keys are spread evenly, about 2^SORT_LEFT_BITS keys have
+     * each value of the digit */
+    SORT_LEFT_BITS = 2
 };
 
 static int count_significant_bits(uint64_t x)
@@ -256,7 +260,8 @@ static void insertion_sort(uint64_t *keys, int64_t count)
 }
 
 /* Sorts the keys in `from` on one thread; the result is in `other` if to_other is set, and otherwise in `from`. The
- * number of bits of a digit is chosen so that each digit gets a few keys. All keys must be different. */
+ * number of bits of a digit is chosen so that only a few keys have the same value of the digit. All keys must be
+ * different. */
 static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
 {
     if (count <= SORT_INSERTED) {
@@ -285,7 +290,8 @@ static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_
     }
 }
 
-/* Does the same as sort_serial() on all threads. All keys must be equal in their bits above the lowest `top` bits. */
+/* Sorts the keys in `from` on all threads; the result is in `other` if to_other is set, and otherwise in `from`. Only
+ * the lowest `top` bits of the keys may differ. All keys must be different. */
 static void sort_parallel(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];

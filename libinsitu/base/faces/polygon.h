@@ -18,8 +18,8 @@
 /* Returns the number of bytes, aligned to 8, of the working memory that a polygon of `count` corners needs. */
 size_t polygon_work_bytes(int count);
 
-/* Cuts a polygon of count corners, at least 3, into count - 2 triangles. Each triangle consists of three corner
- * numbers, which run in the direction of the polygon. Triangles of coincident or collinear corners may have no area.
+/* Cuts a polygon of count corners, at least 3, into count - 2 triangles. Each triangle consists of the indices of three
+ * corners, in the polygon's own direction of rotation. Triangles of coincident or collinear corners may have no area.
  * work: memory of polygon_work_bytes(count) bytes. */
 void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3]);
 
