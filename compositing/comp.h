@@ -44,8 +44,10 @@ typedef struct comp_group {
  * of this function defines the picture; faster code must give the same result. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
-/* Does the same as comp_merge_pixel() for volume fragments that ranks have partly folded. Folding combines all volume
- * fragments of an interval of the ray into one (fragment_fold.h); this function completes it. */
+/* Blends one pixel's fragments in place over background, like comp_merge_pixel(), for pictures whose volume fragments
+ * are folded. Folding combines all volume fragments in an interval of the ray into one, in an order that depends only
+ * on the ray (fragment_fold.h). Ranks may have folded a part of the fragments; this function folds the remaining
+ * ones. Local. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth);
 
@@ -56,8 +58,9 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
  * two volumes, or of two cells at their common face, do not overlap. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
-/* Does the same as comp_pixel_overlaps() for fragments in the order of comp_merge_folded_pixel(). Fragments behind the
- * depth at which comp_merge_folded_pixel() stops are ignored. Local. */
+/* Returns whether a pixel's fragments overlap (comp_pixel_overlaps()), for fragments that ranks may have folded. They
+ * must be in the order of comp_merge_folded_pixel(). Fragments behind the depth at which comp_merge_folded_pixel()
+ * stops, because almost no light is left, are ignored. Local. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
@@ -92,8 +95,9 @@ typedef struct comp_overlaps {
     unsigned char *pixels;
 } comp_overlaps;
 
-/* Does the same as comp_composite(), and also returns the pixels with overlaps on every rank. If any pixel has
- * overlaps, another reduction is performed, with one bit per pixel. On an error *overlaps is empty. */
+/* Composites an image like comp_composite(). In addition, *overlaps receives, on every rank, the pixels in which
+ * fragments overlap. If there are any, one more reduction is performed, with one bit per pixel. On an error *overlaps
+ * is empty. Collective. */
 insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
                                       int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);

@@ -4,8 +4,8 @@
 
 const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* Number of pixels of a tile, in which the renderer makes fragments. All pixels of a tile, or of a block if blocks are
- * smaller than tiles, have the same owner. */
+/* Number of pixels of a tile. The renderer traces the picture tile by tile, so that fragments are clustered in tiles.
+ * All pixels of a tile, or of a block if blocks are smaller than tiles, have the same owner. */
 enum { TILE_PIXELS = 256 };
 
 /* Returns the number of partners to which the busiest rank sends messages in a round: all partners in a dense round,

@@ -87,14 +87,14 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* The state of a pass over the sorted samples at one position. The pass determines which samples are blended. If a
- * volume has one sample at the end of a cell and another at the start of a cell, the cells are neighbours whose common
- * face was rounded to two positions. One of the two samples is then left out. */
+/* The state of a pass over the sorted samples at one position of the ray. The pass determines which samples are
+ * blended. If a volume has one sample at the end of a cell and another at the start of a cell, the cells are neighbours
+ * whose common face was rounded to two positions. Only one of the two samples is then blended. */
 typedef struct sample_pass {
-    uint32_t layer; /* the volume whose samples are counted */
+    uint32_t layer; /* index of the volume layer to which the most recent sample belongs */
     /* number of samples at the start of their cell that no sample at a cell's end has matched yet */
     int64_t unmatched_begins;
-    int64_t counted; /* number of samples counted so far */
+    int64_t counted; /* number of samples of this volume that are blended, so far */
 } sample_pass;
 
 static bool is_counted(sample_pass *pass, const fragment *sample)
@@ -258,7 +258,8 @@ static void emit_interval(const interval_sink *sink, const blend *b, const fragm
     sink->callback(sink->state, &interval);
 }
 
-/* Does the same as blend_mixture(), and also passes the mixture to the sink. */
+/* Blends the mixture of the given volume fragments between the depths `from` and `to` behind what *b contains
+ * (blend_mixture()), and passes the mixture to the sink's callback. */
 static void blend_interval(blend *b, const fragment *items, int64_t count, float from, float to,
                            const interval_sink *sink)
 {
@@ -298,7 +299,7 @@ static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, cons
     return end;
 }
 
-/* Does the same as blend_sorted() for a pixel with one fragment, which is the most frequent case. */
+/* Blends a pixel's only fragment over the background. Most pixels have only one fragment. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];

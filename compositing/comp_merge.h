@@ -13,8 +13,9 @@ typedef void comp_interval_callback(void *state, const fragment *stretch);
  * passed. sorted: the pixel's fragments in the order of comp_merge_pixel(); the order is the same on return. Local. */
 void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
-/* Does the same as comp_merge_intervals() for the fragments that comp_merge_folded_pixel() blends. There is one such
- * fragment per interval of the ray, made from all fragments of the interval (fragment_fold.h). */
+/* Calls the callback for each fragment that comp_merge_folded_pixel() blends, front to back. For volumes there is one
+ * such fragment per interval of the ray, or per part of an interval if surfaces divide it. It is folded from all of the
+ * pixel's volume fragments there (fragment_fold.h). Surface hits are passed unchanged. Local. */
 void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
 #endif

@@ -40,8 +40,8 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* ---- joined ----------------------------------------------------------------------------------------------------- */
 
-/* Adds a pixel to the mixed ones, whose fragments are listed and merged one by one. The fragment that m->joined
- * contains for the pixel is counted as its first. */
+/* Marks a pixel as mixed, so that all of its fragments are listed and merged one by one. Does nothing if it is marked
+ * already. The fragment that m->joined contains for the pixel is counted as its first fragment. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;

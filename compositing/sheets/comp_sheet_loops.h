@@ -10,9 +10,9 @@
  * its pixels are first moved together, so that they fill rows without gaps (a compacted sheet). A lane is fresh in a
  * row if it has a pixel in this row but none in the rows above. Its value is then predicted from another lane. */
 typedef struct sheet_plan {
-    int rows, count;
-    bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
-    /* for each row that contains pixels: row: its index in the strip; number: its number of pixels */
+    int rows, count; /* rows: number of rows that contain pixels; count: number of pixels in all rows */
+    bool is_sparse;  /* true: the sheet is compacted before packing, so that fresh and source are not set */
+    /* For each row that contains pixels. row: index of the row in the strip; number: number of pixels in the row. */
     uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
     uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose most recent value predicts it */

@@ -187,8 +187,9 @@ ROWS_INLINE lanes expand_lanes(lanes from, unsigned mask)
     return load_lanes(gapped);
 }
 
-/* compress_row() and expand_row() do the same as compress_lanes() and expand_lanes() for a row in memory. They may read
- * all 16 values of their input and write all 16 values of their output. */
+/* compress_row() stores the values of a row whose bits are set in the mask, without gaps. expand_row() reverses this:
+ * it moves such values back to the positions of the mask's bits. Both may read all 16 values of their input and write
+ * all 16 values of their output. */
 ROWS_INLINE void compress_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)
@@ -291,8 +292,9 @@ ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *p
     return out;
 }
 
-/* Returns WORD_UNIFORM if all pixels have the first pixel's value, WORD_REPEATED if all equal the preceding word, and
- * otherwise WORD_LINEAR. */
+/* Returns how a word is stored. The result is WORD_UNIFORM if all pixels have the first pixel's value, and
+ * WORD_REPEATED if the word equals the preceding word in all pixels. Otherwise it is WORD_LINEAR, although the caller
+ * may then choose WORD_CONSTANT instead, if it takes fewer bytes. */
 ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
 {
     const uint32_t *own = sheet->words[word], *before = sheet->words[word ? word - 1 : 0];

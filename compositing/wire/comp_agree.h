@@ -27,8 +27,9 @@ void comp_claims_free(comp_claims *claims);
  * *maximum is replaced by its maximum over all ranks; maximum may be NULL. Collective: one reduction. */
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, base_error *error);
 
-/* Does the same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction.
- * *maximum is limited to INT32_MAX. With more than 2^20 ranks the error message may name a wrong rank. */
+/* Returns the largest status of all ranks and replaces *maximum by its maximum over all ranks, like comp_agree(). The
+ * same reduction adds up the first `count` claims over all ranks. *maximum is limited to INT32_MAX. With more than 2^20
+ * ranks the error message may name a wrong rank. Collective. */
 insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maximum, comp_claims *claims, int count,
                                 base_error *error);
 

@@ -33,7 +33,7 @@ void comp_messages_append(comp_messages *to, comp_messages *from);
 
 typedef struct comp_parcel {
     uint32_t owner;
-    uint32_t records;
+    uint32_t records; /* number of sheets in the parcel */
     uint32_t bytes;
     const unsigned char *data;
 } comp_parcel;
@@ -54,7 +54,8 @@ typedef struct comp_writer {
  * all bytes that are still to be written; it determines the size of a new message. */
 unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
-/* Adds the data from the start of the reserved space to `end` to the parcel. The data contain `records` records. */
+/* Appends to the parcel the bytes that the caller has written, from the start of the reserved space up to `end`.
+ * `records` is the number of sheets in these bytes. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
 /* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */

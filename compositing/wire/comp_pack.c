@@ -76,9 +76,10 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     return is_ok;
 }
 
-/* What a thread packs at once: a part of the fragments for one partner of the first round. They are the fragments for
- * all owners whose first digit is `digit` (comp_route.h), except for the owner at this rank's own place. The part has
- * the index `share` of `shares`. */
+/* The work that a thread packs at once: a part of this rank's fragments for all owners whose place has `digit` as its
+ * first digit (comp_route.h). One partner of the first round gets these fragments; if `digit` is the first digit of
+ * this rank's own place, they are kept for later rounds. Fragments that this rank owns itself are not packed. The
+ * strips of each owner are divided into `shares` parts; `share` is the index of the part. */
 typedef struct batch {
     int digit, radix, place;
     int share, shares;

@@ -9,7 +9,7 @@
 /* The owners of the blocks of a picture. */
 typedef struct comp_owners {
     int32_t *places; /* place of each block's owner; -1 if no rank has a fragment in the block */
-    int count;       /* number of owners; they have the first places */
+    int count;       /* number of owners; their places (comp_route.h) are 0 .. count - 1 */
 } comp_owners;
 
 /* Packs this rank's fragments for other owners into messages. *out receives the messages to the partners of the first
