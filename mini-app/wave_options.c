@@ -150,7 +150,8 @@ static const option_row rows[] = {
 
 enum { ROW_COUNT = sizeof rows / sizeof *rows };
 
-/* Fills getopt_long()'s table. Row i returns i + 1, because getopt_long() uses 0 for other purposes. */
+/* Fills getopt_long()'s table of options. For the option in row i of `rows`, getopt_long() returns i + 1, because it
+ * uses the result 0 for other purposes. */
 static void list_options(struct option list[ROW_COUNT + 1])
 {
     for (int i = 0; i < ROW_COUNT; ++i)

@@ -13,7 +13,9 @@ typedef struct wave_report {
     double memory_before; /* this rank's resident memory in bytes before libinsitu was opened */
     double simulation_ms,
         insitu_ms; /* sums of the times of all steps so far; the time of a step is that of its slowest rank */
-    double bytes_peak, bytes_grown; /* maximum memory so far over all ranks */
+    /* Maxima over all ranks and steps so far, in bytes. bytes_peak: peak of the memory that libinsitu has allocated
+     * (insitu_report.bytes_peak); bytes_grown: resident memory of the process minus memory_before. */
+    double bytes_peak, bytes_grown;
 } wave_report;
 
 /* Prints how many cells, ranks and steps the run has, and the head of the table of steps. Collective. */

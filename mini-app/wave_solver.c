@@ -102,7 +102,7 @@ static void measure_cells(const wave_mesh *mesh, int32_t cell, wave_cell_geometr
 }
 
 /* Stores the faces and volume of an own cell; returns the largest stable time step for it. */
-static double measure_own_cells(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
+static double measure_own_cell(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
 {
     int bytes = s->setup.real_bytes, count = wave_cell_shape_of(wave_mesh_type(s->mesh, cell))->face_count;
     int64_t first = 4 * wave_mesh_first_face(s->mesh, cell);
@@ -146,7 +146,7 @@ static bool fill_cells(wave_solver *s, double (*centroid)[3])
         store_real(s->speed, s->setup.real_bytes, c, s->setup.medium.speed[s->layers[c]]);
         for (int a = 0; a < 3; ++a) centroid[c][a] = g.centroid[a];
         if (c >= s->mesh->own_cells) continue;
-        s->time_step = fmin(s->time_step, measure_own_cells(s, c, &g));
+        s->time_step = fmin(s->time_step, measure_own_cell(s, c, &g));
         if (!add_source_cell(s, c, g.centroid)) return false;
     }
     return true;

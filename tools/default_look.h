@@ -23,7 +23,8 @@ struct default_look {
  * surface, seen from the viewer, shows only a small part of the field's range. Throws std::runtime_error. */
 default_look choose_look(const options &o, const step_source &source);
 
-/* Return the direction from the data to the viewer (from the options, or a default), and the up direction. */
+/* eye_direction() returns the direction from the data to the viewer, which is that of the options or else a default.
+ * up_direction() returns the axis that points up in the picture: y, or z if the viewer looks along y. */
 std::array<double, 3> eye_direction(const options &o);
 std::array<double, 3> up_direction(const options &o);
 

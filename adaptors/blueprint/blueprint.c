@@ -38,9 +38,9 @@ struct insitu_blueprint {
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
-    named_lattices lattices; /* the lattices of this rank's blocks that entered the last agreement of the ranks on
-                                common lattices */
-    named_lattices common;   /* the lattices on which all ranks agreed, for the same meshes */
+    /* for each mesh, the lattice of this rank's blocks; this list was the input of the last named_lattices_agree() */
+    named_lattices lattices;
+    named_lattices common; /* for each mesh in `lattices`, the lattice of the blocks of all ranks */
     insitu_blueprint_report report;
     char error[NODE_MESSAGE + 64];
 };
@@ -63,8 +63,9 @@ static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name, 
     return NULL;
 }
 
-/* Finds a block with cells that has been set for the next step, or returns NULL. The search runs backwards from the
- * mesh that was set most recently, because the domains of a node have the same topologies. */
+/* Finds a block with cells of the mesh of this name that has been set for the next step, or returns NULL. The search
+ * runs backwards from the mesh that was set most recently: the domains of a node usually have the same topologies, so
+ * that the previous domain's block of this mesh is found after a few comparisons. */
 static const known_mesh *find_pending_block(const insitu_blueprint *adaptor, const char *name)
 {
     for (int i = 1; i <= adaptor->known_count; i++) {
@@ -423,7 +424,7 @@ static void place_blocks(insitu_blueprint *adaptor)
         known->lattice = lattice;
         known->mesh.lattice = &known->lattice;
         known->mesh.changed = INSITU_CHANGED_NOTHING;
-        blueprint_set_target(&target, &known->mesh); /* insitu_step() returns an error of this call */
+        blueprint_set_target(&target, &known->mesh); /* if this fails, insitu_step() returns the error later */
     }
 }
 

@@ -35,8 +35,8 @@ static uint64_t hash_bytes(const char *data, int64_t bytes)
     return blueprint_mix_hash(blueprint_mix_hash(lanes[0], lanes[1]), blueprint_mix_hash(lanes[2], lanes[3]));
 }
 
-/* Does the same as hash_bytes() for elements of a given size and stride. The function is inlined so that the size is a
- * constant. */
+/* Hashes `count` elements of `size` bytes that are `stride` bytes apart, in several independent lanes like
+ * hash_bytes(). The function is inlined, so that the size is a constant. */
 static inline uint64_t hash_elements(const char *data, int64_t count, int64_t stride, size_t size)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, bits[LANES] = {0};

@@ -53,7 +53,7 @@ bool node_has(const node *parent, const char *path);
  * not an error. */
 bool node_find(const node *parent, const char *path, node *out);
 
-/* Does the same as node_find(), but a missing node is an error. */
+/* Finds the node at the path. If it does not exist, sets the error and returns false. */
 bool node_require(const node *parent, const char *path, node *out);
 
 int64_t node_child_count(const node *parent);

@@ -10,7 +10,13 @@
 namespace
 {
 
-/* Lengths relative to the size of the text. */
+/* Lengths as multiples of the height of the text.
+ * border: distance of all blocks from the edges of the picture. padding: distance of a block's content from the edges
+ * of the block, and width of the gap around covered areas. line_height: distance between the baselines of two lines.
+ * baseline: distance from the top of a line to its baseline. thickness: width of a colour bar's colours. label_width:
+ * width above which a colour bar's label is wrapped, unless the bar with its numbers is wider. foot: space below a
+ * colour bar, for the lower half of the lowest number. shortest_bar: minimum height of a colour bar. tick_distance:
+ * minimum distance between ticks with numbers. column_gap: distance between columns of colour bars. */
 const double border = 0.55, padding = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
 const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2, column_gap = 0.5;
 const double size_factors[] = {1, 0.85, 0.7, 0.55, 0.45};
@@ -265,7 +271,7 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     align_lines(s, g.labels[n], INSITU_LEFT, b);
     const double spare = std::floor(g.head - pixels(padding, g.size) - 0.5 * g.size -
                                     line_height * g.size * static_cast<double>(b.lines.size()));
-    /* moves a label that has fewer lines than the others down to its bar */
+    /* moves a label that has fewer lines than the labels of other bars down, so that it is directly above its bar */
     for (placed_line &line : b.lines) line.baseline += spare;
     b.gradient = {left, bounds.y0 + g.head, left + thickness * g.size, bounds.y1 - edge};
     b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);

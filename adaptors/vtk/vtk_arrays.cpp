@@ -98,7 +98,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, held_arr
     return true;
 }
 
-/* Copies an array of any class, through VTK's access by double. */
+/* Copies an array of any class element by element. Each element is read by GetComponent(), which returns a double. */
 template <typename To> array_view convert_any(vtkDataArray *array, held_arrays &held)
 {
     array_view view = describe_array(array, element_type<To>());

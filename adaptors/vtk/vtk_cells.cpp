@@ -164,17 +164,17 @@ template <typename Id> struct raw_cells {
         return higher;
     }
     /* Returns whether the cell is read from VTK's own connectivity without conversion. */
-    bool is_as_it_is(int64_t cell, const cell_conversion &r) const
+    bool is_read_directly(int64_t cell, const cell_conversion &r) const
     {
         if (r.kind == conversion_kind::polygon) return size(cell) >= r.needed_points;
         if (r.kind == conversion_kind::higher && r.replacement.type != types[cell]) return false;
         return r.kind == conversion_kind::higher || r.kind == conversion_kind::as_it_is
-                   ? size(cell) == linear_size(cell, r)
+                   ? size(cell) == passed_point_count(cell, r)
                    : false;
     }
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
     /* Returns the number of the cell's points that are passed to libinsitu. */
-    int64_t linear_size(int64_t cell, const cell_conversion &r) const
+    int64_t passed_point_count(int64_t cell, const cell_conversion &r) const
     {
         return r.kind == conversion_kind::polygon || !r.replacement.vertex_count ? size(cell)
                                                                                  : r.replacement.vertex_count;
@@ -225,7 +225,7 @@ new_size count_converted_cells(const raw_cells<Id> &raw, const cells_with_faces 
         if (!is_drawn) size.is_one_to_one = false;
         if (!is_drawn) continue;
         size.cells++;
-        size.vertices += is_faced ? with_faces.faces.cell_size(number++) : raw.linear_size(i, r);
+        size.vertices += is_faced ? with_faces.faces.cell_size(number++) : raw.passed_point_count(i, r);
     }
     return size;
 }
@@ -249,7 +249,7 @@ void fill_converted_cells(const raw_cells<Id> &raw, const cells_with_faces &with
             number++;
             continue;
         }
-        for (int64_t v = 0; v < raw.linear_size(i, r); v++) {
+        for (int64_t v = 0; v < raw.passed_point_count(i, r); v++) {
             const int64_t point = r.kind == conversion_kind::polygon || r.kind == conversion_kind::higher
                                       ? v
                                       : r.replacement.vertices[static_cast<size_t>(v)];
@@ -324,7 +324,7 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     log.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
     const cell_conversion &first = raw.conversion_of(0);
     if (first.kind != conversion_kind::polygon && by_type[raw.types[0]] == raw.count &&
-        grid->GetCells()->IsHomogeneous() == raw.linear_size(0, first)) {
+        grid->GetCells()->IsHomogeneous() == raw.passed_point_count(0, first)) {
         mesh.cell_type = static_cast<insitu_cell_type>(raw.types[0]);
         return;
     }
@@ -334,8 +334,8 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     log.bytes_borrowed += raw.count + (raw.count + 1) * static_cast<int64_t>(sizeof(Id));
 }
 
-/* Returns whether cells of the type cannot be in one mesh with cells of higher order. */
-bool is_apart(uint8_t type)
+/* Returns whether cells of the type (polygons and polyhedra) cannot be in one mesh with cells of higher order. */
+bool excludes_higher_order(uint8_t type)
 {
     const conversion_kind what = cell_conversions()[type].kind;
     return what == conversion_kind::polygon || what == conversion_kind::faces;
@@ -362,7 +362,7 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
                          grid->GetNumberOfCells(), has_equal_orders_on_axes(grid)};
     const int64_t connectivity_count = connectivity->GetNumberOfValues();
     std::array<int64_t, 256> by_type{};
-    bool is_as_it_is = true;
+    bool are_read_directly = true;
     for (int64_t i = 0; i < raw.count; i++) {
         by_type[raw.types[i]]++;
         if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
@@ -371,10 +371,11 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
                     std::to_string(connectivity_count) + " entries";
             return false;
         }
-        raw.are_higher_known = raw.are_higher_known && !is_apart(raw.types[i]);
+        raw.are_higher_known = raw.are_higher_known && !excludes_higher_order(raw.types[i]);
     }
-    for (int64_t i = 0; i < raw.count; i++) is_as_it_is = is_as_it_is && raw.is_as_it_is(i, raw.conversion_of(i));
-    if (is_as_it_is) {
+    for (int64_t i = 0; i < raw.count; i++)
+        are_read_directly = are_read_directly && raw.is_read_directly(i, raw.conversion_of(i));
+    if (are_read_directly) {
         view.cells.count = raw.count;
         borrow_cells(grid, raw, by_type, connectivity_count, view);
     } else {

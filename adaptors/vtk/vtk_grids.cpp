@@ -28,8 +28,9 @@
 namespace
 {
 
-/* The number of points along each axis that has more than one point. There are three such axes, or two in a flat
- * grid. */
+/* The size of a structured grid in points, counted only along the axes that have more than one point. row_points:
+ * number of points along the first of these axes. row_count: number of points along the second one. layer_count: number
+ * of points along the third one; 1 if the grid is flat. */
 struct lattice {
     int64_t row_points = 1, row_count = 1, layer_count = 1;
 

@@ -97,8 +97,9 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
 
 static int cut_tets(const int64_t v[8], wave_cell *cells)
 {
-    /* Each tet has the edges of a path from corner 0 to corner 6. The path follows the three axes in one of six orders.
-     * Tets of odd orders are mirrored. */
+    /* Each tet has the vertices of a path along edges of the cube from corner 0 to corner 6. The path follows the three
+     * axes in one of six orders. If the order is an odd permutation of x, y, z, the two vertices in the middle are
+     * exchanged, so that the tet has a positive volume. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
         cells[t] = (wave_cell){WAVE_TYPE_TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};

@@ -1,12 +1,13 @@
-/* Creates one rank's part of the mesh.
+/* Creates one rank's part of the mesh. Own cubes and cells belong to this rank, and own vertices are the vertices of
+ * own cells. Foreign cubes belong to other ranks.
  *
  *     own cubes ──> own cells ──> own vertices          (in ascending order of cube id)
- *     the 26 cubes around each ──> foreign cubes, by (owner, cube) ──> those of their cells that touch an own vertex
- *     own cells that share a corner with a foreign cube ──> sends to its owner, by (owner, cell)
+ *     the 26 cubes around each own cube ──> foreign cubes, by (owner, cube) ──> their cells that touch an own vertex
+ *     own cells that share a corner with a foreign cube ──> cells to send to its owner, by (owner, cell)
  *
- * Every corner of a cube is a vertex of one of its cells, whatever their type. Sharing a corner with a cube of rank B
- * is therefore the same as sharing a vertex with a cell of rank B. A's list of sends to B equals B's list of receives
- * from A, in the same order of cell ids. */
+ * Every corner of a cube is a vertex of one of its cells, whatever their type. Therefore a cell shares a corner with a
+ * cube of rank B if and only if it shares a vertex with a cell of rank B. The list of cells that rank A sends to rank B
+ * hence equals the list of cells that B expects from A, and both are in the order of cell ids. */
 #include "wave_mesh_create.h"
 
 #include <stdlib.h>

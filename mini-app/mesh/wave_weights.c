@@ -1,7 +1,8 @@
-/* Least squares: value(x) = mean + g.(x - m), where m is the mean of the centroids r_i, and g = M^-1 sum (r_i - m) f_i
- * with M = sum (r_i - m)(r_i - m)^T. The weight of cell i at the vertex v is therefore 1/n + (v - m).M^-1 (r_i - m). M
- * is singular if the centroids do not span space. To regularize it, 1e-9 of its trace is added to the diagonal, which
- * makes the slope zero in the undetermined directions. */
+/* Let f_i be the values and r_i the centroids of the n cells around a vertex. The least squares fit is value(x) = mean
+ * + g.(x - m), where mean is the mean of the f_i, m is the mean of the r_i, and g = M^-1 sum (r_i - m) f_i with M = sum
+ * (r_i - m)(r_i - m)^T. The weight of cell i at the vertex v is therefore 1/n + (v - m).M^-1 (r_i - m). M is singular
+ * if the centroids do not span space. To regularize it, 1e-9 of its trace is added to its diagonal, which makes the
+ * slope zero in the undetermined directions. */
 #include "wave_weights.h"
 
 static void solve_symmetric(const double m[3][3], const double b[3], double x[3])

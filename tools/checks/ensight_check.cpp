@@ -79,9 +79,10 @@ std::string first_line(ensight_stream &in, encoding how)
     return is_name ? in.line() : line;
 }
 
-/* Checks whether another step begins, and reads its description if there is one. `line` is the file's first line for
- * the first step, because a file may contain a single step without "BEGIN TIME STEP"; for later steps it is "". */
-bool is_next(ensight_stream &in, std::string line, bool is_first)
+/* Returns whether the file has another step, and reads its first line of description. For the first step, `line` must
+ * be the file's first line, because a file with a single step may lack the line "BEGIN TIME STEP". For later steps,
+ * `line` must be "". */
+bool begin_next_step(ensight_stream &in, std::string line, bool is_first)
 {
     if (!is_first && !in.next_line(line)) return false;
     if (starts_with(line, "BEGIN TIME STEP"))
@@ -100,7 +101,7 @@ class geometry_parser
     std::vector<geometry> steps()
     {
         std::vector<geometry> all;
-        for (std::string line = first_line(in_, how_); is_next(in_, line, all.empty()); line = "")
+        for (std::string line = first_line(in_, how_); begin_next_step(in_, line, all.empty()); line = "")
             all.push_back(parts());
         return all;
     }
@@ -275,7 +276,7 @@ void check_variable(const std::string &path, encoding how, const std::vector<geo
     ensight_stream in(path, how);
     size_t step = 0;
     std::string partial;
-    for (std::string line = first_line(in, how); is_next(in, line, step == 0); line = "", step++) {
+    for (std::string line = first_line(in, how); begin_next_step(in, line, step == 0); line = "", step++) {
         const geometry &parts = steps[std::min(step, steps.size() - 1)];
         if (step > 0 && !(parts == steps[0]))
             in.fail("has steps of different sizes in one file, which are not read: a file for each step is");

@@ -41,8 +41,8 @@ class data_file
     /* Returns the path of the file that contains the step, for messages. */
     virtual std::string step_path(size_t step) const = 0;
 
-    /* Returns the largest number of pieces in which a step can be read, which is 1 for most files. A structured grid
-     * has as many as cells. Throws as read() does. */
+    /* Returns the largest number of pieces in which a step can be read. It is 1 for most files, and the number of cells
+     * for a structured grid. Throws as read() does. */
     virtual int pieces(size_t step) = 0;
 
     /* Reads piece number `piece` of `pieces` of a step; piece 0 of 1 is the whole step. step is 0 for a file without

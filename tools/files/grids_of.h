@@ -19,8 +19,9 @@ namespace render_tool
  * path, if a cell refers to a point that does not exist. */
 vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &path);
 
-/* Does the same as grids_of(), but overlapping AMR, and images, rectilinear and curvilinear grids with cells of two or
- * three dimensions, are not converted. Cells of AMR under a finer level get a ghost flag. */
+/* Returns data in a form that the VTK adaptor draws. Overlapping AMR, and images, rectilinear and curvilinear grids
+ * with cells of two or three dimensions, are not converted; cells of AMR that a finer level covers get a ghost flag.
+ * All other data is converted as by grids_of(). Throws as grids_of() does. */
 vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path);
 
 /* Returns "", or a description of the first cell that lies outside the connectivity or refers to a point that does not

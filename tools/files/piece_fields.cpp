@@ -1,5 +1,7 @@
-/* Pieces are changed only depending on the piece itself and the parallel file, so that the picture does not depend on
- * which pieces a rank reads. Double represents the values of all shorter types. */
+/* Fields are added to a piece, or removed from it, depending only on the piece itself and on the parallel file. The
+ * picture therefore does not depend on which pieces a rank reads. A field whose type differs between the pieces that a
+ * rank reads is converted to double. This does not change values, because double represents all numbers of fewer than 8
+ * bytes exactly. */
 #include "piece_fields.h"
 
 #include <algorithm>

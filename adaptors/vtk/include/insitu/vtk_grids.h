@@ -17,7 +17,7 @@ extern "C" {
 /* Converts a data set to an unstructured grid. Images, rectilinear and curvilinear grids become hexahedra, or quads if
  * they are flat; all other data keep their cells. Point and cell arrays are shared with data, and so are the points if
  * data lists them, and the polygons of polygonal data that has nothing else. The list of cells takes 37 bytes per
- * hexahedron including its offset and type, or 73 bytes if there are more than 268 million points; For images and
+ * hexahedron including its offset and type, or 73 bytes if there are more than 268 million points. For images and
  * rectilinear grids, a list of points is allocated too, with 24 bytes per point, or 12 if the axes are floats. A cell
  * with a hidden point is flagged as hidden. The caller owns the grid and must call its Delete(). data does not change.
  * May throw std::bad_alloc. Local. */
