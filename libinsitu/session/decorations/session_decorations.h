@@ -19,8 +19,8 @@ typedef struct session_decorations {
     /* all decorations; its pointers refer to members of this struct and to the layers */
     insitu_decorations decorations;
     insitu_decorations background;            /* only the background, for files without other decorations */
-    insitu_words words[SESSION_MAX_WORDS];    /* the texts */
-    insitu_colour_bar bars[SESSION_MAX_BARS]; /* the colour bars */
+    insitu_words words[SESSION_MAX_WORDS];    /* the title, if there is one, followed by the scene's other texts */
+    insitu_colour_bar bars[SESSION_MAX_BARS]; /* one colour bar per field, colours and ticks that layers show */
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];          /* label of each colour bar */
     const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the colour bars show */

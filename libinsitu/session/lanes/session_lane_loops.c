@@ -43,8 +43,8 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* The sums, minimum and count of a call of a lane_run function. Each lane has its own, over the cells that it has
- * processed. */
+/* Results of one call of a lane_run function. Each lane of the vectors contains the results over the cells that this
+ * lane has processed. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */

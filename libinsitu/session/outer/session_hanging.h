@@ -25,7 +25,7 @@ typedef struct session_hanging_basis {
     session_mesh_group *mesh_group;
     int part_count;
     const session_mesh *const *meshes; /* the parts of the mesh group's meshes on this rank */
-    const int64_t *first_vertices;     /* for each part, the index of its first vertex in this numbering */
+    const int64_t *first_vertices;     /* for each part, the index of its first vertex among those of all parts */
     /* for each vertex of all parts, the index of its group; -1: it belongs to no drawn cell */
     const int64_t *group_of_vertex;
     int64_t group_count;

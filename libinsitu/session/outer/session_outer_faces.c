@@ -442,7 +442,8 @@ static bool make_tables(face_search *s)
     return true;
 }
 
-/* Makes a part whose cells are split be searched as corner cells. Returns false if memory runs out. */
+/* If the mesh's cells are split into pieces, makes the search of part *p read the corner cells (linear cells with the
+ * same corners) instead of the pieces. Otherwise does nothing. Returns false if memory runs out. */
 static bool read_corners(const session_mesh *mesh, part_cells *p)
 {
     if (!mesh->topology.is_split) return true;

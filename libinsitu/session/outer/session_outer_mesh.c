@@ -436,8 +436,9 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Increases the upper bounds of sizes by what rims need: the rims of the caller's cells that have outer faces. A rim
- * may need further vertices, because some of its nodes may lie on no outer face. */
+/* Increases the upper bounds of array sizes in *most by the space for the rims of those cells of the caller that have
+ * outer faces. A rim is stored as a loop. It may need further vertices too, because some of its nodes may lie on no
+ * outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;

@@ -64,8 +64,9 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
     return session_light_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because the jobs of the turns
- * differ only in the set of their pixels. */
+/* Computes the lighting of the fragments. The occluders, by which rays to lights may be blocked, are built once per
+ * frame and used by all of its turns (passes over some of the pixels): the jobs of the turns differ only in the set of
+ * their pixels. */
 static insitu_status light_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      session_frame *frame, render_statistics *rendered, base_error *error)
 {

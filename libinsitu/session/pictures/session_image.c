@@ -27,9 +27,11 @@
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static insitu_image_write_function *loaded_writer;
-/* NULL: the library is not loaded, or it is of another version */
+/* the library's function that draws a picture into a larger one; NULL: the library is not loaded, or its version lacks
+ * the function */
 static insitu_image_place_function *loaded_placer;
-/* NULL: the library is not loaded, or it is of another version */
+/* the library's function that finds texts which cannot be drawn; NULL: the library is not loaded, or its version lacks
+ * the function */
 static insitu_image_check_words_function *loaded_checker;
 
 static void *open_library(const char *path, char *why, size_t size)

@@ -54,8 +54,8 @@ static bool add_visible_intervals(session_scalar *scalar, const scene_volume *la
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(layer, intervals);
-    /* A colour range that is computed from the data requires a reduction over all ranks. Here it is not known yet, so
-     * that all cells are kept as candidates. */
+    /* If the colour range is computed from the data, it is not known yet, because it requires a reduction over all
+     * ranks. The visible values are then unknown too, and all cells are kept as candidates. */
     if (!layer->colour_map.range.is_fixed) scalar->needs_all_cells = true;
     return scalar->needs_all_cells || add_intervals(scalar, intervals, count);
 }

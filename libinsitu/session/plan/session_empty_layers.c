@@ -27,8 +27,8 @@ typedef struct planned_layer {
     const scene_isosurface *isosurface;
     const scene_volume *volume;
     const scene_surface *surface; /* an outer surface with a threshold */
-    /* number by which the warning of the layer's first isovalue, volume or threshold is distinguished
-     * (session_warning.number) */
+    /* session_warning.number of the layer's warning, which distinguishes it from the warnings of the image's other
+     * layers; for an isosurface, that of its first isovalue, to which the index of another isovalue is added */
     int number;
     /* range of the layer's values. In the first reduction the range of a surface is [0, 0] if some cell is within the
      * threshold, and otherwise empty (low > high). */

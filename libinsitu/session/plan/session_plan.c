@@ -203,9 +203,9 @@ static const char *describe_missing_colour(const scene_colour_map *map)
     return map->has_nan ? "of the colour nan" : "grey";
 }
 
-/* Warns of meshes that have the surface but lack the field that colours it. */
-static void warn_of_grey(const session_catalogue *catalogue, const scene_image *image, const scene_isosurface *layer,
-                         session_report *report)
+/* Warns of meshes on which an isosurface is drawn without its colours, because they lack the field that colours it. */
+static void warn_of_grey_isosurface(const session_catalogue *catalogue, const scene_image *image,
+                                    const scene_isosurface *layer, session_report *report)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
@@ -360,9 +360,9 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
-/* Warns of meshes on which the layer is drawn but which lack the field of its contour lines. `on` lists the meshes of
- * the layer. Only meshes that have the field `on` are considered, unless the layer is an outer surface, for which `on`
- * has no name. */
+/* Warns of meshes on which a layer is drawn but which lack the field of the layer's contour lines. on: the field of
+ * which the layer is made; it selects the meshes on which the layer is drawn. An outer surface is made of no field:
+ * on->name is then NULL, and only on->meshes selects meshes. */
 static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
                              const scene_lines *lines, session_report *report)
 {
@@ -432,7 +432,8 @@ static void warn_of_shells_and_ungrouped_meshes(const session_catalogue *catalog
 static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_image *image, session_report *report)
 {
     for (int i = 0; i < image->isosurface_count; i++)
-        if (image->isosurfaces[i].has_colour_by) warn_of_grey(catalogue, image, &image->isosurfaces[i], report);
+        if (image->isosurfaces[i].has_colour_by)
+            warn_of_grey_isosurface(catalogue, image, &image->isosurfaces[i], report);
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
     for (int i = 0; i < image->isosurface_count; i++)

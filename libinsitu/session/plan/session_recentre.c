@@ -419,9 +419,9 @@ static const uint64_t *next_record(const uint64_t *record)
     return record + RECORD_HEAD + count_record_values(record);
 }
 
-/* Returns whether the group uses the record's values. If any rank has values of boundary faces, values of cells are
- * ignored. */
-static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
+/* Returns whether the record's values are included in the mean of the group. If the group has values of boundary faces
+ * on any rank, values of cells are ignored. */
+static bool uses_record_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
     return !values->has_face_values[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
@@ -453,7 +453,7 @@ static bool gather_values_by_group(const session_mail *in, const int64_t *groups
         if (r[RECORD_HEAD - 1] & FACE_VALUES) values->has_face_values[groups[i]] = 1;
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++) {
-        if (!has_values(r, values, groups[i])) continue;
+        if (!uses_record_values(r, values, groups[i])) continue;
         memcpy(values->values + values->ends[groups[i]], r + RECORD_HEAD,
                (size_t)count_record_values(r) * sizeof(double));
         values->ends[groups[i]] += count_record_values(r);

@@ -30,8 +30,8 @@ typedef enum session_mail_tag { SESSION_MAIL_THERE = 1, SESSION_MAIL_BACK } sess
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error);
 
-/* Exchanges words in the same way as session_mail_deliver(), but errors while receiving are also returned on all ranks.
- * Collective; all ranks return the same status. */
+/* Sends the words in every rank's `out` to the ranks for which they are intended (session_mail_deliver()). An error on
+ * any rank, also while receiving, is returned on all ranks. Collective; all ranks return the same status. */
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
 
 /* Returns the number of items, such as patch faces or vertices, that a rank processes in one round of messages, if each

@@ -377,8 +377,8 @@ static insitu_status fail_for_refused_mesh(session_meshes *meshes, session_mesh 
     return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
 }
 
-/* Reports that the mesh or block does not exist. The message states if a block is requested of a mesh without blocks,
- * or no block of a mesh with blocks. */
+/* Reports that the mesh or block does not exist. If the mesh consists of blocks and a field of the whole mesh was set,
+ * or the mesh has no blocks and a field of a block was set, the message names the function to call instead. */
 static void fail_for_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
                                   base_error *error)
 {

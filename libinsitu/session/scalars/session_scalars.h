@@ -46,8 +46,8 @@ bool session_is_plain_copy(const session_mesh *mesh, const session_field *field)
  * the field. */
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out);
 
-/* Adds a scalar to the mesh, and marks all data of the scalar as stale. The scalar refers to the field with index 0
- * until the caller sets another field. Returns NULL if memory runs out. */
+/* Appends a scalar to the mesh's list, and marks all data of the scalar as stale. All other members are 0; the calling
+ * function must set them, for example the index of the scalar's field. Returns NULL if memory runs out. */
 session_scalar *session_add_scalar(session_mesh *mesh);
 
 /* Returns whether the scalar is the vertices' distance from a plane. */

@@ -195,7 +195,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     if (status == INSITU_OK) status = scene_convert_parameters(d, out);
-    if (status == INSITU_OK) status = scene_convert_meshes_drawn(d, in, out);
+    if (status == INSITU_OK) status = scene_convert_mesh_transforms(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
@@ -214,9 +214,9 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Chooses between two entries that select the mesh by their names: returns whether `name` selects the mesh and is
- * longer than `found`, the name of the best entry so far, which may be NULL. */
-static bool is_nearer(const char *name, const char *found, const char *mesh)
+/* Returns whether the entry with this name should be used for the mesh instead of the best entry so far, whose name is
+ * `found`. This is the case if `name` selects the mesh and is longer than `found`, or if found is NULL. */
+static bool is_better_match(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));
 }
@@ -226,7 +226,7 @@ const scene_warp *scene_find_warp(const scene *s, const char *mesh)
     const scene_warp *found = NULL;
     for (int i = 0; i < s->warp_count; i++) {
         const scene_warp *warp = &s->warps[i];
-        if (is_nearer(warp->mesh, found ? found->mesh : NULL, mesh)) found = warp;
+        if (is_better_match(warp->mesh, found ? found->mesh : NULL, mesh)) found = warp;
     }
     return found;
 }
@@ -236,7 +236,7 @@ const scene_mirror *scene_find_mirror(const scene *s, const char *mesh)
     const scene_mirror *found = NULL;
     for (int i = 0; i < s->mirror_count; i++) {
         const scene_mirror *mirror = &s->mirrors[i];
-        if (is_nearer(mirror->mesh, found ? found->mesh : NULL, mesh)) found = mirror;
+        if (is_better_match(mirror->mesh, found ? found->mesh : NULL, mesh)) found = mirror;
     }
     return found;
 }

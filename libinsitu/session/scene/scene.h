@@ -26,7 +26,8 @@ typedef struct scene_field {
     int component; /* index of the component, or one of the constants SCENE_COMPONENT_* */
     /* set if cell values are averaged to the vertices; otherwise they are drawn as constants per cell */
     bool at_vertices;
-    /* set if a field with different values of cells at a common vertex gets the mean of these values there */
+    /* For a field with a value at each corner of each cell: set if the values of all corners at a vertex are replaced
+     * by their mean. Otherwise cells may have different values at a common vertex. */
     bool joins_corners;
     bool is_as_given; /* set if hanging vertices keep the values that the caller gave */
     int line;         /* line in the scene file, for messages about the field */

@@ -143,8 +143,9 @@ insitu_status scene_convert_statistics(const scene_document *d, const scene_file
 insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_derived(scene *s);
 insitu_status scene_convert_parameters(const scene_document *d, scene *out);
-/* Converts the warps and mirrors of meshes. */
-insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_file *in, scene *out);
+/* Converts the key `meshes`: for each mesh, the field by which its vertices are displaced (scene_warp), and the planes
+ * at which it is mirrored (scene_mirror). */
+insitu_status scene_convert_mesh_transforms(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_meshes(scene *s);
 
 /* Returns an error if two outputs would be written to the same file. */

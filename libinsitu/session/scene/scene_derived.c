@@ -86,8 +86,8 @@ static insitu_status read_references(const scene_document *d, const char *path, 
     return status;
 }
 
-/* Reads the field of the keys `field` and `magnitude`. Its scalar is stored as an expression that consists only of this
- * field. */
+/* Reads the field that the key `field` or `magnitude` of a derived field names. The given component of the field is
+ * stored as an expression that consists only of this input. */
 static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;

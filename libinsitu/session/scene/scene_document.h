@@ -45,8 +45,9 @@ bool scene_is_plain_name(const char *name);
  * is no node at the path. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
-/* Stores pointers to the keys of the mapping at a path, in the same way as scene_document_texts(). The keys must be
- * names that the scene defines. */
+/* Stores pointers to the keys of the mapping at a path, at most `most` of them. The keys must be names that the scene
+ * defines; the document owns them. Returns how many keys the mapping has, even if this is more than `most`; 0 if there
+ * is no mapping at the path. */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
 /* scene_document_kind() tells whether the node at a path is a scalar, a list or a mapping, or does not exist.

@@ -138,7 +138,8 @@ static bool add_operator_instruction(parser *p, scene_operation operation)
     return add_instruction(p, operation, 0, 0);
 }
 
-/* Emits the instruction for a power. If the exponent is a small whole number, the instruction needs no logarithm. */
+/* Emits the instruction for a power. If the exponent is a number, whole and at most MOST_WHOLE_POWER in magnitude, the
+ * instruction is SCENE_OP_WHOLE_POWER, which is evaluated by multiplications; otherwise it is SCENE_OP_POWER. */
 static bool add_power(parser *p)
 {
     const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];

@@ -83,7 +83,7 @@ static insitu_status convert_mesh(const scene_document *d, const scene_file *in,
     return status || !is_mirrored ? status : convert_mirror(d, path, mesh, s);
 }
 
-insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_file *in, scene *out)
+insitu_status scene_convert_mesh_transforms(const scene_document *d, const scene_file *in, scene *out)
 {
     insitu_status status = INSITU_OK;
     if (in->meshes_count == 0) return INSITU_OK;

@@ -35,7 +35,8 @@ typedef struct piece_error {
     bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
     bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
                        every rank */
-    /* largest errors over all requests of the mesh, and numbers of cells that isosurfaces cross */
+    /* results of measuring all requests of the mesh, combined: the largest error, and the number of cells that
+     * isosurfaces may cross */
     session_deviation all;
     /* for each number of pieces between two nodes: bytes that the finer lattices take on all ranks */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];

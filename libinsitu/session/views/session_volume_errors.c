@@ -286,9 +286,11 @@ static double find_integral_at(const volume_errors *of, int quantity, double pos
     return *before + (at - i) * (*after - *before);
 }
 
-/* Computes the means of all quantities over a cell of the mesh. All values between the cell's smallest and largest one
- * are assumed to be equally frequent. */
-static void find_light(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
+/* Computes all quantities per unit of length of a ray in a cell of the mesh. For changes of light, this is the mean
+ * over the cell of the bracket at the top of this file, times the root mean square of the cell's error in the values.
+ * For the other quantities, it is the mean over the cell. All values between the cell's smallest and largest one are
+ * assumed to be equally frequent. */
+static void find_light_per_length(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
     const render_transfer *t = &of->transfer.transfer;
@@ -359,7 +361,7 @@ static void add_cell(void *of, const session_value_cell *cell)
     enum { LAST = GRID_SIZE - 1 };
     const volume_errors *errors = of;
     double light[QUANTITIES];
-    find_light(errors, cell, light);
+    find_light_per_length(errors, cell, light);
     for (int v = 0; v < errors->view_count; v++) {
         covered_part part;
         if (!project_cell(&errors->request->views->cameras[errors->views[v]], cell, &part)) continue;
