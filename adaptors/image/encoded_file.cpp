@@ -11,7 +11,8 @@
 namespace
 {
 
-/* Throws an exception for a message of a C library. The text is the only way to recognize a lack of memory. */
+/* Throws an exception for an error message of a library: std::bad_alloc if the message mentions memory, otherwise
+ * io_error with the message. The libraries report a lack of memory only by the text of their messages. */
 [[noreturn]] void fail_with(std::string what)
 {
     for (const char *words : {"memory", "bad_alloc"})

@@ -37,7 +37,7 @@ class face_list
     /* starts: offsets of the faces; face_points: the points of all faces, in order around each face; sorted: the same
      * points, sorted within each face */
     std::vector<int64_t> starts{0}, face_points, sorted;
-    std::unordered_multimap<uint64_t, int64_t> by_points;
+    std::unordered_multimap<uint64_t, int64_t> by_points; // indices of faces, by a hash of their points
     std::vector<int64_t> cell_starts{0}, cells;
 };
 

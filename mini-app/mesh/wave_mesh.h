@@ -39,8 +39,9 @@ typedef struct wave_mesh {
     int64_t *face_offsets;
     int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
     int64_t face_count;  /* number of faces of own cells; a face between two own cells is counted twice */
-    int64_t unmatched; /* number of faces of own cells inside the box without exactly one neighbour, or on a wall with a
-                          neighbour; 0 for a conforming mesh */
+    /* number of wrong faces of own cells: faces inside the box that do not have exactly one neighbour, and faces on a
+     * wall that have a neighbour; 0 for a conforming mesh */
+    int64_t unmatched;
     int64_t
         *vertex_cell_offsets; /* index of each own vertex's first entry in vertex_cells; a final entry is the total */
     int32_t *vertex_cells;    /* cells around each vertex of an own cell, in ascending order of cell id */

@@ -305,9 +305,9 @@ class hdf_grids : public data_file
                in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
     }
 
-    /* A part has one more entry in the list of offsets than in the list of cells. Returns by how much the part's first
-     * index in the list of offsets is greater than that in the list of cells. This is the number of earlier parts,
-     * without parts that have no entries because they reuse the cells of an earlier step. */
+    /* Returns the difference between a part's first index in the file's list of offsets and its first index in the list
+     * of cells. Each earlier part increases the difference by 1, because it has one more offset than cells. Parts that
+     * reuse the cells of an earlier step have no entries in either list, and are not counted. */
     int64_t offset_lead(const part_position &at) const
     {
         int64_t parts = 0;

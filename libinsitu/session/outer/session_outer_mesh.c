@@ -141,8 +141,9 @@ typedef struct outer_work {
     const session_mesh *whole;
     float (*normals)[3];         /* normal at each vertex of the outer mesh; NULL: the mesh has no normals */
     session_face_normals curved; /* computes normals of curved faces; used only if there are normals and rims */
-    /* parent: index of the caller's cell that contains the current face. face: index, within this cell, of the face of
-     * the cell that contains the current face; -1: the current face lies inside the cell. */
+    /* If the current face belongs to a linear piece of a cell: parent is the index of the caller's cell that is split
+     * into this piece. `face` is the index, within the caller's cell, of the face on which the current face lies; -1:
+     * the current face lies inside the caller's cell. */
     int64_t parent;
     int face;
     bool is_curved; /* true: normals of face `face` of the cell `parent` can be computed */

@@ -34,7 +34,9 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* for each recentring of an input, and later for each mesh: nonzero if its values are out of date */
+    /* working memory of two phases: first one number per recentring of an input, then one number per mesh, which is
+     * nonzero if the values there are out of date on some rank */
+    int *stale;
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
@@ -439,8 +441,8 @@ static const session_catalogue_mesh *find_first_mesh_without_fault(const derive_
     return i < mesh_group->count ? mesh_group->meshes[i] : NULL;
 }
 
-/* Returns the number of scalars whose gradients are computed. Ranks without a part of the meshes need this number as
- * well. */
+/* Returns the number of scalars whose gradients are computed. It is determined from the catalogue instead of this
+ * rank's parts, because ranks that have no part of the meshes need it as well. */
 static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_needs_vector(w->derived)) return w->derived->input_count;

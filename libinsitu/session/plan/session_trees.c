@@ -241,8 +241,8 @@ static uint64_t hash_parts(const session_meshes *meshes, int *count)
     return key;
 }
 
-/* Stores the bounding boxes of the parts for the tree over them. The ranges there are unbounded, because several fields
- * share the tree; ranges are tested from the root of each part's own tree on. */
+/* Stores the bounding boxes of the parts, over which the parent tree is built. Several fields share the parent tree, so
+ * that its ranges of values are unbounded. A traversal tests ranges only from the root of each part's own tree on. */
 static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 {
     int part = 0;

@@ -594,8 +594,8 @@ static void record_adding_threads(const target *to, int64_t cell)
     while (grid_walk_next(&walk, &vertex)) record_adding_thread(to, vertex);
 }
 
-/* Adds the contributions of all cells. The loop distributes the cells among the threads in the same way as the loop
- * that recorded the threads. */
+/* Adds the contributions of all cells. If to.owners is given, a first loop records which threads add to each sum. The
+ * second loop, which adds the contributions, has the same schedule, so that each thread processes the same cells. */
 static bool add_all_cells(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
     double rise = 0, sharpness = 0;

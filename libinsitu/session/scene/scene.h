@@ -279,12 +279,14 @@ typedef struct scene_light {
     float colour[3]; /* linear RGB, multiplied by the light's intensity */
 } scene_light;
 
-/* Camera positions on circles around the data. Views are numbered circle by circle: view / view_count is the index of
- * the view's circle. */
+/* Maximum number of circles of an orbit. */
 enum { SCENE_MAX_ELEVATIONS = 32 };
 
 /* Default distance between the samples of volumes, in cell sizes (scene_image.step_cells). */
 #define SCENE_STEP_CELLS 0.5
+
+/* Camera positions on circles around the data. Views are numbered circle by circle: view / view_count is the index of
+ * the view's circle. */
 typedef struct scene_orbit {
     int view_count;   /* number of views on each circle; 0: there is no orbit */
     double axis[3];   /* unit vector along the axis of the orbit */
@@ -596,6 +598,7 @@ typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_wri
 
 /* Default of scene.finer_memory, in MiB. */
 enum { SCENE_FINER_MEMORY = 4096 };
+/* Default of scene.surface_error, in pixels. */
 #define SCENE_SURFACE_ERROR 0.25
 
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a

@@ -36,7 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    /* number of brackets and signs that are open at the current position; it is limited to MOST_NESTED */
+    /* number of calls of parse_sign() that have not returned, at most MOST_NESTED. Each bracket, function and exponent
+     * that is being parsed adds one. */
     int nesting_depth;
     int stack_count; /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;

@@ -4,9 +4,11 @@
 
 #include "scene_schema.h"
 
+/* Size in bytes of the buffers for descriptions, including the terminating NUL. */
+enum { SCENE_WORDS_SIZE = 640 };
+
 /* Describes the values that a key accepts, for example "a number above 0 and below 180" or "a list of 3 numbers from 0
  * to 1". */
-enum { SCENE_WORDS_SIZE = 640 };
 void scene_describe_value(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 
 /* Describes the values that a key accepts, with additions for messages: the keys of the mappings in a list, and the

@@ -188,7 +188,8 @@ static void fill_fields(const session_pieces_basis *basis, const session_due_vie
     session_clear_requested_fields(basis->meshes);
 }
 
-/* Values of one mesh that are summed over the ranks. */
+/* Values of one mesh that are summed over the ranks. cell_count, unbounded_count and area are those of
+ * session_deviation. */
 typedef struct piece_sums {
     int64_t cell_count, unbounded_count, area;
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
