@@ -10,7 +10,8 @@
  * between two points is that of the second point. */
 typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING, COLOUR_STEP } colour_space;
 
-/* Interpolates between the sRGB colours a and b (components in [0, 1]); the result is linear light in [0, 1]. */
+/* Interpolates between the sRGB colours a and b (components in [0, 1]). share: weight of b, from 0 to 1. The result is
+ * linear light in [0, 1]. */
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3]);
 
 /* Converts one sRGB component to linear light, in double. */

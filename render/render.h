@@ -212,8 +212,8 @@ typedef struct render_surface_layer {
     float opacity; /* opacity of the surface, 0 .. 1; at 1 it ends the ray */
     render_material material;
     render_normal normal;
-    /* distance h between the two samples of a central difference, which lie h / 2 before and behind the hit; in sizes
-     * of the hit's cell (the cube root of its bounding box's volume), > 0 */
+    /* distance h between the two samples of a central difference, which lie h / 2 before and behind the hit; > 0, in
+     * units of the size of the hit's cell (the cube root of its bounding box's volume) */
     double difference;
     const render_vertex_gradients *gradients; /* gradients at the vertices of each part; used by RENDER_VERTEX */
     const render_lines *lines;                /* contour lines on the surface; NULL if there are none */
@@ -225,9 +225,9 @@ typedef struct render_surface_layer {
      * such a face only in an edge, so that its interval in the cell has length zero, then also hits the surface. */
     bool is_of_faces;
     uint32_t clips; /* clips of the job that cut the surface: bit i stands for clips[i] */
-    /* Used for shadows and ambient occlusion, whose rays begin at hits (render_light.h). The distance from a hit, in
-     * cell sizes, within which a cell of this surface does not occlude the hit, although a ray meets the surface there.
-     * 0: every cell occludes. */
+    /* Used for shadows and ambient occlusion, whose rays begin at hits (render_light.h). A ray's crossing of this
+     * surface does not occlude the hit if it is closer to the hit than `contact` times the size of the crossed cell
+     * (the cube root of its bounding box's volume). 0: every crossing occludes. */
     float contact;
 } render_surface_layer;
 

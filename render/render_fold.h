@@ -17,9 +17,9 @@ typedef struct render_folding {
     int64_t capacity, *starts;
 } render_folding;
 
-/* Replaces the list of a tile's fragments, in which each sample or segment of the volume is one fragment.
- * fragment_fold.h divides a ray into intervals and halves of intervals. If this rank certainly has all volume fragments
- * of a pixel in one of these, they are blended into one fragment.
+/* Folds a tile's list of fragments, and replaces it by the result. In the list, each sample or segment of the volume is
+ * one fragment. fragment_fold.h divides a ray into intervals and halves of intervals. If this rank certainly has all
+ * volume fragments of a pixel in one of these, they are blended into one fragment.
  *
  * On input, a fragment of the kind FRAGMENT_EARLY may be preceded by a surface or by fragments of other ranks. A
  * fragment of the kind FRAGMENT_LATE is an extra fragment that marks a ray on which cells overlap. Returns false if

@@ -332,9 +332,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * error_of_each);
-    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. Therefore it also
-     * depends on the partition whether a segment is cut at the surface by the rank or by compositing. Both must give
-     * the same result, to 1e-6. Segments of several volumes are always cut by compositing. */
+    /* A segment is cut at a surface either by this rank or by compositing. Which of them cuts it depends on the
+     * partition, because a rank finds overlaps that lie clearly in front of the surface only among its own cells. Both
+     * must give the same result, to 1e-6. Segments of several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : longest_ray_in_scene(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {

@@ -24,8 +24,8 @@
 typedef struct kernel_cells {
     int type, vertices; /* cell type (grid.h), and number of vertices of each cell */
     int count;
-    int value; /* for cells that an isovalue crosses: the isovalue's index in the layer; all cells of the list have the
-                  same one */
+    /* for cells that an isovalue crosses: index of this isovalue in the layer, the same for all cells of the list */
+    int value;
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;

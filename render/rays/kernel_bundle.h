@@ -19,7 +19,8 @@
 enum { KERNEL_BUNDLE_RAYS = 64 };
 
 typedef struct kernel_bundle {
-    /* tile of the bundle; only its centre and radius are set, other members are 0; the rays are stored below */
+    /* Defines the tile space in which the rays are given (kernel_types.h). Only the tile's centre and radius are set;
+     * its other members are 0. */
     kernel_tile tile;
     int count;
     /* One bit per ray: set as long as no opaque surface has been found that blocks the ray. Only rays whose bit is set
@@ -29,7 +30,7 @@ typedef struct kernel_bundle {
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
-    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* the same rays in tree space; used to test clips */
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* the bundle's rays in tree space, used to test clips */
 } kernel_bundle;
 
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)

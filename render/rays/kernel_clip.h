@@ -96,8 +96,8 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns interval `number`, counted from 0, of the intervals that a set of clips leaves of a ray beyond t = `begin`;
- * KERNEL_NO_PART if there are fewer. clips: one bit per clip of the job. */
+/* Returns one of the intervals that a set of clips leaves of a ray behind the depth `begin`. clips: one bit per clip of
+ * the job; number: index of the interval, counted from 0. Returns KERNEL_NO_PART if there are fewer intervals. */
 static inline kernel_ray_part kernel_clip_find_interval(const render_job *job, uint32_t clips,
                                                         const kernel_clip_ray *ray, double begin, int number)
 {

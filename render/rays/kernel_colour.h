@@ -42,9 +42,9 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
-/* Returns the position in the colour table, whose ends are 0 and 1, of a value x on a logarithmic or symmetric
- * logarithmic scale. x is given in the transfer function's domain. The scale's function (render_scaled()) is computed
- * with a relative error of 3e-7. */
+/* Returns the position in the colour table of a value on a logarithmic or symmetric logarithmic scale: 0 at the table's
+ * first colour, 1 at its last. x: the value in the transfer function's domain. The scale's function (render_scaled())
+ * is computed with a relative error of 3e-7. */
 static __attribute__((noinline)) vf kernel_scaled_position(const kernel_transfer *t, vf x)
 {
     const vf threshold = vf_set(t->threshold), size = vf_max(vf_abs(x), threshold);
@@ -157,7 +157,7 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* One fragment per ray (fragment.h). `kind` of each lane is added to the kind that is passed to
+/* One fragment per lane (fragment.h). A fragment's kind is the sum of the member `kind` and of the parameter `kind` of
  * kernel_append_fragments(). */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
@@ -188,7 +188,8 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
     vf second[4] = {f->colour[1], f->colour[2], f->transmittance, vf_from_bits(kinds)};
     vf_transpose(first);
     vf_transpose(second);
-    /* now vector i % 4 holds the four numbers of ray i from lane i / 4 * 4 on */
+    /* The two transpositions have collected the members of each fragment: vector i % 4 of `first` has four members of
+     * ray i's fragment, in the lanes from i / 4 * 4 on, and that of `second` the other four. */
     for (; bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         char *item = (char *)&list->items[list->count++];

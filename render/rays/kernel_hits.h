@@ -24,11 +24,12 @@ typedef struct kernel_hits {
      * normals come from differences */
     vf reach;
     vf kind;
-    int cut_count; /* number of rows in `cut`; 0 if the frame has no volumes */
-    /* row n holds t of the crossing of each ray that was found as its n-th, so that rows are not sorted; +inf if a ray
-     * has fewer */
+    /* number of rows of `cut` in use: the largest number of crossings of a ray; 0 if the frame has no volumes */
+    int cut_count;
+    /* Depths t at which the rays cross transparent surfaces. Row n has, for each ray, the crossing that was found as
+     * the ray's n-th; the crossings of a ray are not sorted by depth. +inf: the ray has no n-th crossing. */
     vf cut[KERNEL_MAX_CUTS];
-    vm overflowed; /* rays with more than KERNEL_MAX_CUTS crossings */
+    vm overflowed; /* rays with more than KERNEL_MAX_CUTS crossings; the excess crossings are not stored */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)

@@ -25,8 +25,10 @@ typedef struct kernel_packet {
     bool has_view;
     /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* Set if the rays are camera rays through the tile's pixels, and not rays that begin at hits. Camera rays of a tile
-     * differ only in (u, v), which is their slope or, if the camera is orthographic, their origin (kernel_cell.h). */
+    /* Set if edge functions on the rays are computed from lines: affine functions of (u, v), which is a camera ray's
+     * slope or, if the camera is orthographic, its origin (kernel_cell.h). Lines are used for camera rays through the
+     * tile's pixels, except for segments of volumes. For all other rays, edge functions are computed from projected
+     * vertices. */
     bool is_pencil;
     vf u, v;
     vf t_near; /* t at which the rays begin: that of the eye's plane, or clip_in if that is farther */
@@ -248,9 +250,8 @@ typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
-/* A point on each ray inside a cell. t: the ray's parameter; value: the field there; r: reference coordinates in the
- * cell. mask: the rays that have such a point; set only for crossings of faces and for points whose comments mention
- * it. */
+/* A point of each ray inside a cell. t: depth; value: the field there; r: reference coordinates in the cell. mask: the
+ * rays that have such a point. It is set for crossings of faces, and otherwise only if a function's comment says so. */
 typedef struct kernel_point {
     vf t, value, r[3];
     vm mask;

@@ -95,8 +95,10 @@ static inline void kernel_compute_block_borders(const kernel_frame *f, const ker
     }
 }
 
-/* Computes the planes relative to the eye, in double: the components of their normals along the camera's right, up and
- * forward axes, and their offsets. Their positive side is that of greater columns and rows. */
+/* Computes, in double, the planes of the block borders and the two lanes for depths (KERNEL_DEPTH_LANE,
+ * KERNEL_ALONG_LANE). axes: components of the normals along the camera's right, up and forward axes; offset: the
+ * planes' offsets if positions are counted from the eye. The positive side of a border's plane is that of greater
+ * columns or rows. */
 static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_tile *tile, double axes[3][KERNEL_LANES],
                                           double offset[KERNEL_LANES])
 {
@@ -155,9 +157,10 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* Positions near the scene and the eye have magnitudes of at most size + 1. The sum of three products has an
-     * error of 4 roundings of this number times the 1-norm of the normal; the centre and the half widths of a box add 1
-     * rounding, the normal and the offset 1 more. */
+    /* Upper bound of the rounding error of a distance, in roundings (6e-8). Positions near the scene and the eye have
+     * magnitudes of at most size + 1. The sum of three products errs by at most 4 roundings of this magnitude times the
+     * 1-norm of the normal. The centre and the half widths of a box add 1 rounding, and the normal and the offset 1
+     * more. The bound below has 16 roundings. */
     for (int i = 0; i < KERNEL_LANES; i++) {
         offset[i] = (float)exact[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));

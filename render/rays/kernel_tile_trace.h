@@ -26,7 +26,7 @@ typedef struct kernel_tile_trace {
     unsigned begun;         /* mask of the blocks whose packets have been set up */
     /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
     int clip_interval;
-    float t_near;
+    float t_near; /* t at the eye's plane; while volumes are traced, least t of the current window */
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
     float pixel_far[KERNEL_TILE_PIXELS];
@@ -150,9 +150,10 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 
-/* A node on a traversal's stack. A tile traverses a tree in one of two ways: by blocks, with a mask of the blocks in
- * which the node may be visible in front of their hits; or by pixels, with the box of pixels in which the node may be
- * visible (kernel_tile_surface.h). */
+/* A node on the stack of a tile that traverses a tree. There are two traversals. In the traversal by blocks, `place` is
+ * a mask of the blocks in which the node may be visible; blocks in which nearer hits hide the node are removed when it
+ * is taken from the stack. In the traversal by pixels (kernel_tile_surface.h), `place` is the box of the pixels in
+ * which the node may be visible. */
 typedef struct kernel_tile_node {
     /* index of the node; or, in traversals by pixels, index of a leaf's first cell or of an inner node's left child */
     int64_t ref;
@@ -163,8 +164,9 @@ typedef struct kernel_tile_node {
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
-/* Returns the node's placement. Its mask of blocks has those of the given blocks in which the node may be visible. The
- * mask is 0 if the node contains no visible values. visible_values: NULL if all values are visible. */
+/* Returns the node's placement. Its `blocks` are those of the given blocks in which the node may be visible; none if
+ * the node contains no visible value or ends in front of the depth t->t_near. visible_values: NULL if all values are
+ * visible. */
 SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
                                                        const mmbvh_ranges *ranges,
                                                        const kernel_visible_values *visible_values, int64_t node,
@@ -294,8 +296,8 @@ SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-/* Returns, for pixels at the given positions among the tile's packets, the numbers of 32 bits that a member of the
- * packets holds for them, one per ray. of_first: that member of the first packet. */
+/* Gathers a member of the tile's packets that has 32 bits per lane, for one ray per lane. at: positions of the rays
+ * among the tile's packets (kernel_pixel_position()); of_first: address of the member in the first packet. */
 SIMD_INLINE vf kernel_gather_of_packets(const void *of_first, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
@@ -304,18 +306,19 @@ SIMD_INLINE vf kernel_gather_of_packets(const void *of_first, vi at)
 
 /* The rays of SIMD_WIDTH pixels, one per lane, each of which has a cell of its own. */
 typedef struct kernel_lane_rays {
-    /* lane: the lane in which the cells' vectors hold the ray's cell; at: position of its pixel among the tile's
-     * packets (kernel_pixel_position()) */
+    /* lane: the lane that holds the ray's cell in the vectors of cells; at: position of the ray's pixel among the
+     * tile's packets (kernel_pixel_position()) */
     vi lane, at;
     kernel_rays rays;
-    /* lanes that have a ray; active, u and v are set only by kernel_lane_rays_begin() and kernel_lane_rays_of_packet()
-     */
+    /* Lanes that have a ray. This member, u and v are set only by kernel_lane_rays_begin() and
+     * kernel_lane_rays_of_packet(). */
     vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
     vf far;  /* t of the ray's nearest hit so far (kernel_packet.t_far); set only when surfaces are traced */
 } kernel_lane_rays;
 
-/* Computes the rays through the given pixels of the tile (16 * row + column). lane: lane of each ray's cell. */
+/* Sets the members lane, at and rays to the rays through the given pixels of the tile (16 * row + column). lane: lane
+ * of each ray's cell. */
 SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
 {
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
@@ -326,7 +329,7 @@ SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *t
         kernel_gather_tile_numbers(tile->slope_x, column), kernel_gather_tile_numbers(tile->slope_y, row)};
 }
 
-/* Loads up to SIMD_WIDTH rays of the list, from ray `first` on; missing rays are inactive. */
+/* Loads up to SIMD_WIDTH rays of the list, from index `first` on. Lanes behind the end of the list are inactive. */
 SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile_trace *t,
                                         const kernel_pixel_list *rays, int first)
 {
@@ -338,7 +341,8 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
     out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }
 
-/* Returns the depths at which the rays begin. Only clips of all layers make rays begin at different depths. */
+/* Returns the depths at which the rays begin. They differ only if the frame has clips that apply to all layers
+ * (kernel_frame.common_clips). */
 SIMD_INLINE vf kernel_lane_rays_near(const kernel_tile_trace *t, const kernel_lane_rays *r)
 {
     if (__builtin_expect(t->frame->common_clips == 0, 1)) return vf_set(t->t_near);

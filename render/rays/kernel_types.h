@@ -55,23 +55,25 @@ typedef float kernel_real;
 
 enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
-/* Entries of a piece of a transfer function: a range of values on which opacity and colour are linear. At a value x in
- * the range from low to high, each is its value at low + (x - low) * its slope. 1 - opacity has entries of its own,
- * because near an opacity of 1 the difference would consist of rounding errors only. The function is constant before
- * its first and behind its last point. The first and the last piece therefore end at -+2^100, so that
- * KERNEL_PIECE_INVERSE times the width is still 1. */
+/* Entries of a piece of a transfer function. A piece is a range of values, from low to high, on which opacity and
+ * colour are linear. At a value x in this range, the opacity is its value at `low` plus (x - low) times its slope, and
+ * so is each channel of the colour. 1 - opacity has entries of its own, because near an opacity of 1 the computed
+ * difference would consist of rounding errors only. The function is constant below its first and above its last point.
+ * The infinite ends of the first and the last piece are replaced by -+2^100, so that KERNEL_PIECE_INVERSE times the
+ * width is still 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
-    KERNEL_PIECE_LOW_REST, /* exact lower end minus KERNEL_PIECE_LOW, which is rounded to kernel_real; 0 unless
-                              kernel_pieces.has_rests is set. The next entry is the same for the upper end. */
+    /* Exact end of the piece minus KERNEL_PIECE_LOW or KERNEL_PIECE_HIGH, which are rounded to kernel_real; 0 unless
+     * kernel_pieces.has_rests is set. */
+    KERNEL_PIECE_LOW_REST,
     KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* opacity at the upper end */
     KERNEL_PIECE_CLEAR,        /* 1 - opacity at the lower end */
     KERNEL_PIECE_CLEAR_HIGH,
     KERNEL_PIECE_INVERSE, /* 1 / (high - low), the inverse width of the piece */
-    KERNEL_PIECE_SLOPE,   /* slope of the opacity over the value */
+    KERNEL_PIECE_SLOPE,   /* derivative of the opacity by the value */
     KERNEL_PIECE_COLOUR,
     KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
@@ -83,11 +85,11 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Entries of a row of kernel_pieces.variations: bounds over a range of values in which the opacity has no step. Let g
- * be the change of a pixel's light, in any channel, if the field has an error along one unit distance of the ray,
- * divided by this error. KERNEL_LIGHT_COST is the maximum of |g| over the range of values and over all colours of the
- * light from behind. KERNEL_LIGHT_VARIATION is the largest difference of g between two values of the range, for the
- * same light from behind. */
+/* Entries of a row of kernel_pieces.variations: bounds over a range of values in which the opacity has no step. Suppose
+ * that the field has a small error e along one unit distance of a ray, and that this changes a channel of the pixel's
+ * light by g e. KERNEL_LIGHT_COST is the maximum of |g| over the range of values and over all colours of the light from
+ * behind. KERNEL_LIGHT_VARIATION is the largest difference of g between two values of the range, for the same channel
+ * and the same light from behind. */
 enum {
     KERNEL_LIGHT_VARIATION,
     KERNEL_LIGHT_COST,
@@ -102,8 +104,8 @@ enum {
  * light_unit. The struct is read as rows of four floats. */
 typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
-    float own[4];
-    int32_t colour; /* colour at the bin's middle, 10 bits per channel, in units of colour_unit */
+    float own[4];      /* sums over this bin; integers, stored as floats */
+    int32_t colour;    /* colour at the bin's middle, 10 bits per channel, in units of colour_unit */
     /* error bound of a segment's light per unit distance, due to the variation of extinction and emission in the bin */
     float table_error;
     float unused[2];
@@ -114,16 +116,22 @@ typedef struct kernel_preintegral {
     int bin_count;
     kernel_preint_entry *entries; /* array of bin_count + 2 bins */
     float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
-    float depth_unit, light_unit;
+    float depth_unit, light_unit; /* units of the sums of extinctions and of emissions (kernel_preint_entry) */
+    /* colour_unit: unit of packed colours; colour_error: upper bound of the deviation of a colour from that of its bin
+     */
     float colour_unit, colour_error;
+    /* The deviation of a colour channel from its chord over a range of values of width h is at most h (h bend_square +
+     * bend) + colour_error. If the range extends beyond the ends of the colour table, the smaller of h bend_at_ends and
+     * contrast is added. */
     float bend_square, bend, bend_at_ends, contrast;
+    /* error of light that a segment may have: allowed_absorbed per unit of its absorption, plus allowed_length per unit
+     * distance of its length */
     float allowed_absorbed, allowed_length;
 } kernel_preintegral;
 
 typedef struct kernel_pieces {
     int count;
-    /* pieces of the transfer function, sorted by value; the first begins at about -infinity, the last ends at about
-     * +infinity */
+    /* pieces of the transfer function, sorted by value; the first begins at -2^100, the last ends at 2^100 */
     kernel_real (*pieces)[KERNEL_PIECE_ENTRIES];
     /* A table to find the piece of a value: KERNEL_PIECE_BINS bins of equal width (1 / bin_inverse), the first of which
      * begins at bin_low. bin_first contains, for each bin, the index of the piece in which the bin begins. */
@@ -179,10 +187,11 @@ typedef struct kernel_transfer {
     double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     const float *colours;
     int colour_count;
-    /* The position in the colour table on a logarithmic or symlog scale s is s(value) * scale_slope + scale_shift. */
+    /* On a logarithmic or symmetric logarithmic scale, the position of a value in the colour table is s(value) *
+     * scale_slope + scale_shift, where s is the scale's function (render_scaled()). */
     render_scale scale;
-    /* A value of the transfer function's domain. Symmetric logarithmic scale: the scale's function is linear for
-     * magnitudes up to this threshold. Logarithmic scale: smaller values are replaced by the threshold. */
+    /* Threshold of the scale, in the transfer function's domain. A symmetric logarithmic scale is linear for values of
+     * at most this magnitude. On a logarithmic scale, smaller values are replaced by the threshold. */
     float threshold;
     float inverse_threshold; /* 1 divided by the threshold */
     float scale_slope, scale_shift;
@@ -211,7 +220,8 @@ typedef struct kernel_surface {
     kernel_visible_values visible_values; /* the visible values: the layer's isovalues */
     kernel_transfer colour;               /* transfer function of the colour field; set if the layer has a colour_map */
     kernel_lines lines;                   /* contour lines on the surface; set if the layer has lines */
-    uint32_t own_clips;  /* one bit per clip of this layer that is not among the frame's common_clips */
+    /* this layer's clips that are not among the frame's common_clips; one bit per clip of the job */
+    uint32_t own_clips;
     uint32_t first_kind; /* fragment kind (fragment.h) of the layer's first isovalue */
     /* power of two that scales the width of the field's range to near 1; set for normals by differences */
     double value_scale;
@@ -329,10 +339,10 @@ typedef struct kernel_frame {
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    /* Limits for segments. allowance: error allowed for the approximation of the field (kernel_local_budget.h), or 0 if
-     * segments of hexes, wedges and pyramids are at most as long as the sampling step; mixing: error allowed for the
-     * mixing of overlapping segments; reach: for each volume, upper bound of the length of a ray in the scene, in its
-     * unit distances (render_transfer). */
+    /* Limits for segments. allowance: error of light that the approximation of the field may cause
+     * (kernel_local_budget.h). If it is 0, segments of hexes, wedges and pyramids are at most as long as the sampling
+     * step. mixing: error of light that compositing may cause when it mixes overlapping segments. reach: per volume,
+     * upper bound of the length of a ray in the scene, in the volume's unit distances (render_transfer). */
     float allowance, mixing, reach[RENDER_MAX_VOLUMES];
     /* Set if volume fragments must end at gaps between this rank's cells, because other ranks may have surfaces
      * there. */
@@ -341,7 +351,8 @@ typedef struct kernel_frame {
 
 /* The state of one thread. */
 typedef struct kernel_thread {
-    /* The thread's memory, of the kernel table's memory_bytes. The table's begin() sets the pointers below into it. */
+    /* The thread's memory, which has kernel_table.memory_bytes bytes. kernel_table.begin() sets the pointers below to
+     * parts of it. */
     void *memory;
     struct kernel_cell *cells; /* cache of the cells that have been fetched for single packets (kernel_cell_cache.h) */
     struct kernel_tile_trace *tile;
@@ -408,7 +419,8 @@ static inline double kernel_column_slope(const kernel_frame *f, double x)
 {
     return f->slope_x0 + x * f->slope_dx;
 }
-/* The same for a row of pixels, along the camera's axis `up`. */
+/* Returns the slope (perspective) or the offset (orthographic) of the rays of a row of pixels along the camera's axis
+ * `up`; y: the row. */
 static inline double kernel_row_slope(const kernel_frame *f, double y)
 {
     return f->slope_y0 + y * f->slope_dy;
