@@ -41,8 +41,8 @@ typedef struct kernel_arrays {
     const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
-    /* the three coordinate arrays and the field's array, which are prefetched by vertex index (a cell-centred field is
-     * replaced by the first coordinate) */
+    /* the arrays whose entries are prefetched for a vertex: the three coordinates and the field (if the field is
+     * cell-centred, the first coordinate again) */
     struct {
         const char *data;
         int64_t stride;

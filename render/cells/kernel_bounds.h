@@ -293,9 +293,9 @@ SIMD_INLINE kernel_f64 kernel_f64_squared_length(const kernel_f64 v[3])
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-/* Returns an upper bound of the 8th power of the matrix norm |m|, at most 1.15^8 times that. It is the sum of the 8th
- * powers of the singular values, whose 8th root is a norm; so the maximum over the corners bounds it in the whole
- * domain. */
+/* Returns the sum of the 8th powers of the singular values of m. Let |m| be the matrix norm, the largest singular
+ * value. The sum is at least |m|^8 and at most 1.15^8 |m|^8. Its 8th root is a norm, too, so that the maximum of the
+ * sum over the corners is an upper bound of |m|^8 in the whole domain. */
 SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
 {
     kernel_f64 square[3][3], fourth[3][3], sum = {0};
@@ -485,10 +485,10 @@ static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds
     KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, half, out);
 }
 
-/* Computes all bounds for half of the lanes, for the rays of `beam`, whose directions are near (0, 0, 1). They state
- * how far the field differs from L, how fast L rises along the rays, and how much the value at a crossing of a face can
- * differ from the field on the ray (jump): the value is computed at a point of the face that differs from the ray by
- * the rounding of positions. at: x, y, z in tile space and values, by vertex and lane.
+/* Computes all members of *out for half of the lanes. beam: bounds of the rays, whose directions are near (0, 0, 1);
+ * at: x, y, z in tile space and values, by vertex and lane. The bounds state how far the field differs from the linear
+ * function L, and how fast L rises along the rays. The bound `jump` states how much the value at a computed crossing of
+ * a face can differ from the field on the ray, because the crossing lies beside the ray by the rounding of positions.
  *
  * To prove that F is monotone along the rays: with M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, E
  * changes the derivative of L by grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w). Each of the three terms
@@ -552,7 +552,7 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
  * (kernel_roots.h). */
 typedef struct kernel_curved {
     int type;
-    int lane; /* if all rays of a packet have one cell: its lane */
+    int lane; /* the lane that holds the cell, if all rays of a packet are traced in one cell */
     /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
     float (*at)[8][SIMD_WIDTH];
     float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */

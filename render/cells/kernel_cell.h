@@ -176,9 +176,9 @@ typedef struct kernel_cell {
     float least;
 } kernel_cell;
 
-/* An interval of each ray inside a cell. _in and _out: at the crossings at which the ray enters and leaves. t: ray
- * parameter; v: interpolated values of kernel_cell.f; w: of kernel_cell.g; r: reference coordinates. mask: the rays
- * that have an interval. */
+/* An interval of each ray inside a cell. The members _in belong to the crossing at which the ray enters the cell, the
+ * members _out to the one at which it leaves. t: depth; v, w: kernel_cell.f and kernel_cell.g, interpolated; r:
+ * reference coordinates. mask: the rays that have an interval. */
 typedef struct kernel_interval {
     vm mask;
     vf t_in, t_out, v_in, v_out;
@@ -227,9 +227,9 @@ static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4],
     return corners;
 }
 
-/* Returns whether a polyhedron is a tet, and lists its vertices. It is then drawn as a tet with these vertices would
- * be, bit for bit. Each triangle must lack a different vertex, because two triangles that each occur twice enclose no
- * volume. Faces that have collapsed to a point are ignored. */
+/* Returns whether a polyhedron is a tet, and lists its vertices. Such a polyhedron is drawn bit for bit like a tet with
+ * these vertices. It must have four vertices, and for each of them exactly one triangle that does not contain it. (Two
+ * triangles that each occur twice enclose no volume.) Faces that have collapsed to a point are ignored. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
     int64_t first, end;
@@ -265,10 +265,10 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
     return c->rank[i] < c->rank[j];
 }
 
-/* Computes the canonical order of the vertices of a hex, wedge or pyramid. It begins at the vertex of least rank (of
- * the base, for a pyramid). The neighbours of that vertex then follow in the order of their ranks, as far as the cell's
- * shape allows. from[i] is the present index of the vertex that becomes vertex i. The order may mirror the cell,
- * because intersections do not depend on orientation. */
+/* Computes the canonical order of the vertices of a hex, wedge or pyramid. The first vertex is the one of least rank;
+ * in a pyramid, the one of least rank in the base. The neighbours of the first vertex follow in the order of their
+ * ranks, as far as the cell's shape allows. from[i] is the present index of the vertex that becomes vertex i. The order
+ * may mirror the cell, because intersections do not depend on orientation. */
 SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
     /* maps the index of a hex's vertex to the bits of its reference coordinates x, y, z, and back */
@@ -375,7 +375,7 @@ SIMD_INLINE void kernel_transform_in_double(const kernel_frame *f, const kernel_
     out[2] -= tile->depth_shift;
 }
 
-/* As above, with coordinates rounded to float32. */
+/* Transforms a position in world coordinates into tile space (kernel_types.h), and rounds the result to float32. */
 SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
                                           float *out_x, float *out_y, float *out_z)
 {
@@ -386,8 +386,8 @@ SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_ti
     *out_z = (float)at[2];
 }
 
-/* Reads the positions of the cell's vertices and transforms them into tile space. They are not put in canonical order,
- * and no edge functions are computed. */
+/* Reads the positions of the cell's vertices and transforms them into tile space. The vertices are not put in canonical
+ * order, and no edge functions are computed. */
 static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(kernel_cell *c, const kernel_frame *f,
                                                                              const kernel_tile *tile, const grid *g)
 {
@@ -409,8 +409,8 @@ SIMD_INLINE kernel_tile_position kernel_cell_position(const kernel_cell *c, int 
     return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
-/* Lists a quad's corners in cyclic order. The first is the vertex of smallest rank, the second is that one of its
- * neighbours with the smaller rank. loop: the quad's vertices in the cell, in cyclic order. */
+/* Lists a quad's corners in cyclic order. The first corner is the vertex of smallest rank. The second corner is the one
+ * of its two neighbours that has the smaller rank. loop: the quad's vertices in the cell, in cyclic order. */
 SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *loop, int corner[4])
 {
     int first = 0;

@@ -174,9 +174,9 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
     return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
 }
 
-/* Computes the weights of the triangle i, j, k from its projected vertices on those of the rays in `hit` for which they
- * are not accurate enough. least: an upper bound of kernel_triangle_least() for the triangle, with which most calls
- * return early. */
+/* Replaces the weights of crossings of the triangle i, j, k on those of the rays in `hit` on which they are not
+ * accurate enough: the new weights are computed from the triangle's projected vertices. least: an upper bound of
+ * kernel_triangle_least() for the triangle, with which most calls return early. */
 SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
                                           kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {

@@ -233,7 +233,8 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
                 quad[n].y[i] = corners[n].at[i][1];
                 quad[n].z[i] = corners[n].at[i][2];
             }
-        /* rays that meet an edge are in the mask `alone` of kernel_curved_find(), so none of these rays does */
+        /* none of the active rays meets an edge, because kernel_curved_find() adds rays that may meet one to its mask
+         * `alone` */
         kernel_quads_cross(quad, quads, on_quad, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_point(type, &corners[n], &places[n], &out[n]);
     }

@@ -3,9 +3,10 @@
  *
  * All three maps are one polynomial in the reference coordinates (r, s, q),
  *     c0 + c1 r + c2 s + c3 q + c4 m + c5 r q + c6 s q + c7 m q,
- * with m = r s. The trilinear hex has all terms, the wedge lacks c4 and c7. The pyramid is the collapsed hex, whose map
- * is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 + k c3 +
- * c4 m with m = a b / k, which is linear except for the last term; that term vanishes if the base is a parallelogram.
+ * with m = r s. The trilinear hex has all terms; in the wedge c4 and c7 are 0. The pyramid is the collapsed hex, whose
+ * map is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 +
+ * k c3 + c4 m with m = a b / k, which is linear except for the last term; that term vanishes if the base is a
+ * parallelogram.
  * So Newton's method meets no singularity there: m is bounded by k.
  *
  * A cell is called folded if its map is not one-to-one, so that a point may have several reference coordinates. */
@@ -187,7 +188,8 @@ static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][S
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
 }
 
-/* Copies `count` numbers, one for each vertex of a cell, to all lanes of `out`. Vertices that the cell lacks get 0. */
+/* Copies `count` numbers, one for each vertex of a cell, to all lanes of `out`. If the cell has fewer than eight
+ * vertices, the remaining entries become 0. */
 SIMD_INLINE void kernel_map_spread(const float *numbers, int count, float out[8][SIMD_WIDTH])
 {
     for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? numbers[i] : 0));

@@ -185,8 +185,8 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
 }
 
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w receives the weights that are
- * computed from the lines of the triangle's edges. Where these weights are not accurate enough, the crossings are
- * computed from other weights, but *w still receives the former ones. */
+ * computed from the lines of the triangle's edges. On rays on which these weights are not accurate enough, the
+ * crossings are computed with weights from the projected vertices; *w does not receive those. */
 static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
                                   kernel_triangle_crossings *out)
 {
@@ -200,8 +200,8 @@ static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedr
     return out->mask;
 }
 
-/* Returns the edge function of the edge from one of the triangle's vertices to another, negated if `from` is after
- * `to`. */
+/* Returns the edge function of the triangle's edge from vertex `from` to vertex `to`. Edge functions are stored for the
+ * direction from the lower to the higher vertex index. For the opposite direction the stored one is negated. */
 SIMD_INLINE vf kernel_facet_edge_function(const polyhedron_facet *t, const kernel_poly_crossings *r, int from, int to)
 {
     const int low = from < to ? from : to, high = from < to ? to : from;

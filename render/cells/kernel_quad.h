@@ -205,8 +205,8 @@ static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_qu
 /* ---- a packet, in float32 ---- */
 
 /* The patch's point, relative to the ray, is a + s e + r g + s r h. a: corner 0; e: corner 1 - corner 0; g: corner 3 -
- * corner 0; h: corner 0 - corner 1 + corner 2 - corner 3. ez and gz: larger extent in depth of the two sides along s,
- * and of the two along r. */
+ * corner 0; h: corner 0 - corner 1 + corner 2 - corner 3. ez: the larger extent in depth of the two sides along s; gz:
+ * the same for the two sides along r. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
     vf ez, gz;

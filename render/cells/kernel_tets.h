@@ -70,8 +70,9 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
     }
 }
 
-/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if the rays are camera rays through
- * the tile's pixels, for which the edges' lines are valid (kernel_cell.h). */
+/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if they are computed from the edges'
+ * lines (kernel_cell.h), which are valid for camera rays through the tile's pixels; otherwise they are computed from
+ * projected vertices. */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
     const vf u = t->lane_rays->u, v = t->lane_rays->v;
@@ -224,7 +225,9 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
             kernel_lane_rays lane_rays;
             const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
-            kernel_sums exact[2]; /* not `ends`, which would then be kept in memory */
+            /* a separate variable, because passing the address of `ends` would keep `ends` in memory instead of
+             * registers */
+            kernel_sums exact[2];
             kernel_tets_recompute(&copy, rays, e, has_colour, exact);
             ends[0] = exact[0];
             ends[1] = exact[1];
@@ -233,8 +236,8 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     kernel_tets_set_interval(ends, has_colour, out);
 }
 
-/* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_pencil: whether the edges'
- * lines are used (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
+/* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_pencil: set if edge functions
+ * are computed from the edges' lines (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                        bool is_pencil, bool has_colour, vm hit[4], kernel_interval *out)
 {
@@ -242,7 +245,8 @@ SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transforme
     kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
 }
 
-/* has_colour: set if w_in and w_out are computed, too. */
+/* Computes the rays' intervals in their tets, with edge functions from the edges' lines (kernel_tets_edges()).
+ * has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                           bool has_colour, kernel_interval *out)
 {
@@ -250,7 +254,8 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transfo
     kernel_tet_rays_cross(transformed, r, true, has_colour, hit, out);
 }
 
-/* Does the same as kernel_tet_rays_interval() for rays that all have the tet in the given lane. is_pencil: as above. */
+/* Computes the intervals of rays that all have the tet in the given lane. is_pencil: set if edge functions are computed
+ * from the edges' lines (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                                  int lane, bool is_pencil, bool has_colour, kernel_interval *out)
 {

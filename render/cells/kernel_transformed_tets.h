@@ -89,8 +89,8 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     }
 }
 
-/* Transforms tets whose world coordinates are given in the order of coordinates. is_pencil: whether rays need the edge
- * functions (kernel_packet). */
+/* Transforms tets whose vertices are sorted by coordinates. is_pencil: set if the lines of the tets' edges are
+ * computed, too; only rays with kernel_packet.is_pencil use them. */
 static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transformed_tets *out, const kernel_frame *f,
                                                                    const kernel_tile *tile, bool is_pencil)
 {
@@ -99,8 +99,8 @@ static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transf
 }
 
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
- * lanes get the vertices of the first tet. If values belong to cells, they are not read. is_pencil: as
- * above. */
+ * lanes get the vertices of the first tet. If values belong to cells, they are not read. is_pencil: set if the lines of
+ * the tets' edges are computed. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[4][SIMD_WIDTH], int count, bool is_pencil)
@@ -124,8 +124,8 @@ SIMD_INLINE void kernel_transformed_tets_set(kernel_transformed_tets *out, const
     }
 }
 
-/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. is_pencil: as above.
- */
+/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. is_pencil: set if the
+ * lines of its edges are computed. */
 static __attribute__((noinline, unused)) void kernel_transform_single_tet(kernel_transformed_tets *out,
                                                                           const kernel_cell *c, const kernel_frame *f,
                                                                           const kernel_tile *tile, bool is_pencil)

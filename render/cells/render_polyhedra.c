@@ -185,7 +185,8 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
     return at.used;
 }
 
-/* Stores the sorted vertices and their values, and the centre as their mean, summed in this order. */
+/* Stores the vertices, sorted by coordinates, and their values. Computes the centre, which is the mean of the vertices,
+ * by sums in this order. */
 static void store_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};
