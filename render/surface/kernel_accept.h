@@ -179,8 +179,9 @@ SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3],
         out[a] = (unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a];
 }
 
-/* Stores numbers in place of the hit's colour: the unit normal in world axes (RENDER_NORMALS); or (RENDER_VALUES) the
- * index of the isovalue among all isovalues of the frame, behind the value that the colour already holds. */
+/* Stores numbers in place of the hits' colours. RENDER_NORMALS: the unit normal in world axes. RENDER_VALUES: the first
+ * component already holds the hit's value; the second becomes the index of the isovalue among all isovalues of the
+ * frame. */
 static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
                                                                  vf colour[3])
 {

@@ -196,7 +196,8 @@ static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace 
                                                               vf depth, vf w)
 {
     kernel_line_field along;
-    kernel_surface_hits h; /* no initializer, because it would clear all members */
+    /* members are set one by one, because an initializer would clear all members of the struct */
+    kernel_surface_hits h;
     h.t = depth;
     h.w = w;
     h.vertex_count = 4;
@@ -240,7 +241,8 @@ SIMD_INLINE void kernel_batch_trace_rays(kernel_tile_trace *t, kernel_batch *b, 
         const bool is_whole = first < b->whole_count;
         const vm hit = kernel_batch_find_hits(t, b, &r, is_whole, has_colour, &depth, &w);
         if (!vm_any(hit)) continue;
-        const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
+        /* a copy to be passed on, because taking the address of r itself would keep r in memory instead of registers */
+        const kernel_lane_rays own = r;
         if (!has_colour && b->is_plain && !is_whole)
             nearer |= kernel_batch_accept_plain(t, b, &own, hit, depth);
         else

@@ -149,8 +149,8 @@ SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi 
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Keeps rays in the list h->rays, by moving them towards its front: of the vector of rays that begins at index n, those
- * whose bits are set in `rays` are stored from index `kept` on. Returns the new number of kept rays. */
+/* Moves rays of the list h->rays to its index `kept` and the following ones. rays: which of the SIMD_WIDTH rays from
+ * index n on are moved (a bit mask). Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {

@@ -74,12 +74,14 @@ SIMD_INLINE vm kernel_visible_lane_hits(const kernel_tile_trace *t, const kernel
 {
     const vm visible = vm_and(hit, vm_and(vf_le(kernel_lane_rays_near(t, r), depth), vf_le(depth, r->far)));
     if (__builtin_expect(t->surface->own_clips == 0, 1)) return visible;
-    const kernel_lane_rays copy = *r; /* taking the address of *r would keep the original in memory */
+    /* a copy to be passed on, because taking the address of *r would keep the original in memory instead of
+     * registers */
+    const kernel_lane_rays copy = *r;
     return kernel_lane_hits_kept_by_clips(t, &copy, visible, depth);
 }
 
-/* Emits a ray's hit on the n-th of the cells as a fragment, if the ray's nearest hit has the same depth. ray: lane of
- * the packet p. */
+/* Emits a ray's hit on the n-th of the cells as a fragment of its own. Callers do this if the hit has the same depth as
+ * the ray's nearest hit. ray: lane of the packet p. */
 static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                         int ray, const kernel_surface_cells *cells,
                                                                         int n, float depth, const float normal[3],

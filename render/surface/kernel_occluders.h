@@ -75,7 +75,7 @@ typedef struct kernel_occluder {
 
 /* A tree whose nodes have one child per lane. Lanes without a child have an empty box. */
 typedef struct kernel_occluder_tree {
-    int32_t node_count, leaf_count; /* numbers of nodes and leaves; 0 if the tree is empty */
+    int32_t node_count, leaf_count; /* number of nodes and number of leaves; both are 0 if the tree is empty */
     float *boxes;                   /* boxes of the nodes' children: per node 6 rows of lanes, lower and upper corner */
     int32_t *children;              /* per node and lane: the index of a child node, or ~index of a leaf */
     float *leaves;                  /* the rows of all leaves */
@@ -126,8 +126,8 @@ typedef struct kernel_prepared_ray {
     /* The ray meets the plane at position x along an axis at the distance x * inverse + shift. The shifts for a box's
      * near and far planes differ, so that boxes are extended by more than the rounding error. */
     vf inverse[3], near_shift[3], far_shift[3];
-    /* for each axis, offset among a node's rows of boxes of the row with the planes that the ray meets first, and of
-     * the row with the planes on the boxes' far side */
+    /* Offsets, in floats, into the six rows of a node's boxes. near_row: per axis, offset of the row with those planes
+     * of the boxes that the ray meets first; far_row: offset of the row with the opposite planes. */
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
     /* with d the ray's direction: d[kx] / d[kz], d[ky] / d[kz] and 1 / d[kz] */

@@ -164,8 +164,8 @@ SIMD_INLINE vf kernel_sign_of(vf v)
     return vf_select(vf_lt(v, vf_set(0)), vf_set(-1), vf_set(1));
 }
 
-/* Sets at->value to the field just inside a face, at the point *at of each ray. If it equals `face`, the face's own
- * value, up to rounding, that is used. */
+/* Sets at->value to the field just inside a face, at the point *at of each ray. face: the value that is interpolated on
+ * the face itself; it is stored instead if the two differ only by rounding. */
 SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
     const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);

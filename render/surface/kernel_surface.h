@@ -103,9 +103,10 @@ static __attribute__((noinline)) void kernel_emit_transparent(kernel_packet *p, 
     kernel_append_fragments(p, hit, 0, &f);
 }
 
-/* Draws contour lines over the hits' colours or, if the picture is one of values (RENDER_VALUES), stores the lines'
- * field as the hits' value if the surface has no colour field. Returns the visible hits: if only the lines of the
- * surface are drawn, those on a line. */
+/* Draws contour lines over the hits' colours. If only the lines of the surface are drawn (render_lines.is_alone),
+ * multiplies the hits' opacities by the share of the pixel that a line covers, and returns the hits on a line.
+ * Otherwise returns all hits. In a picture of values (RENDER_VALUES) no colours are drawn. There, lines that are drawn
+ * alone make the value of the lines' field the hits' value, if the surface has no colour field. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
                                                         kernel_surface_hits *h)
 {
@@ -462,17 +463,17 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* Returns a bound of the field's slope for the scaled values c->f, limited so that products of two bounds are finite.
- */
+/* Converts an upper bound of the field's slope to one for the scaled values c->f, limited so that products of two
+ * bounds are finite. */
 SIMD_INLINE vf kernel_scale_slope_bound(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
 }
 
-/* Returns the rays whose field may cross the isovalue between two faces at which it has the same sign. The bounds fall
- * and rise are not valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such
- * rays are always returned. */
+/* Returns the rays whose field may cross the isovalue between two faces at which it has the same sign. The test by the
+ * bounds c->fall and c->rise is not valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or
+ * the reverse; such rays are always returned. */
 SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r)
 {
     const kernel_interval *i = &r->interval;
@@ -528,9 +529,9 @@ SIMD_INLINE void kernel_copy_piece_ends(vm rays, const kernel_interval *from, ke
 
 /* Advances the rays in `left` to the next linear piece of their profiles. Returns the rays whose profile continues
  * behind that piece; a jump at the last face counts as a piece. A value inside the cell that equals the isovalue up to
- * rounding is treated as if it were on the side from which the ray comes: at one point a ray may meet several faces
- * between tets, whose values are rounded differently, so that their signs would alternate. The values at the cell's
- * faces are not changed. */
+ * rounding is treated as if it were on the side of the isovalue from which the ray comes. The reason: at one point a
+ * ray may meet several faces between tets, whose values are rounded differently, so that their signs would alternate.
+ * The values at the cell's faces are not changed. */
 SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm left, kernel_profile_walk *walk)
 {
     kernel_interval next = walk->piece;

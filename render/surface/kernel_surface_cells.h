@@ -11,9 +11,11 @@
 #include "simd.h"
 
 typedef struct kernel_surface_cells {
-    int type, count;           /* type of the cells; number of queued cells */
-    int layer, part;           /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
-    kernel_arrays arrays;      /* arrays of the layer's field on the mesh part, or of its copies in `copied` */
+    int type, count; /* type of the cells; number of queued cells */
+    int layer, part; /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
+    /* the arrays of the layer's field and of the mesh part or, if the part's indices do not fit in 32 bits, those in
+     * `copied` */
+    kernel_arrays arrays;
     uint32_t cell[SIMD_WIDTH]; /* index of the cell in the mesh part */
     /* copies of the members of kernel_tile_candidate: the blocks and the box of pixels that the cell may meet, and its
      * least depth */
@@ -32,7 +34,7 @@ typedef struct kernel_surface_cells {
 } kernel_surface_cells;
 
 /* Sets the layer and the mesh part of the cells that are queued next; the queue must be empty. If the part's indices do
- * not fit in 32 bits, the queue's arrays become those of its own copies. */
+ * not fit in 32 bits, own->arrays refers to the copies in own->copied instead of to the part's arrays. */
 static inline void kernel_surface_cells_set_part(kernel_surface_cells *own, int layer, int part,
                                                  const kernel_arrays *arrays)
 {
@@ -84,7 +86,8 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
                                       SIMD_WIDTH);
 }
 
-/* Copies the coordinates and values of the cells' vertices. */
+/* Copies the coordinates and values of the queued cells' vertices to own->copied; used if the mesh part's indices do
+ * not fit in 32 bits. */
 static __attribute__((noinline)) void kernel_surface_cells_copy(const kernel_tile_trace *t, kernel_surface_cells *own)
 {
     const grid_field *field = &t->surface->layer->field.fields[own->part];

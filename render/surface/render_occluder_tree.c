@@ -17,7 +17,7 @@ enum { MOST_LANES = 16 };
 typedef struct widening {
     const occluder_piece *pieces;
     int64_t piece_count;
-    int rows; /* number of rows of numbers that a piece has, one number per lane */
+    int rows; /* number of floats that are stored for a piece, one in each row of a leaf */
     const mmbvh *binary;
     /* for each node, the pieces below it: index of the first in the binary tree's list of cells, and their number */
     int64_t *first, *count;
