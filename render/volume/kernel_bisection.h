@@ -81,10 +81,10 @@ typedef struct kernel_bisection {
     /* constants of the ray: at depth t its x and y in tile space are (u, v) * (slope * t + depth_offset) */
     double u, v, slope, depth_offset;
     kernel_exact_point in, out; /* ends of the interval, at the crossings of the faces */
-    /* per_t: unit distances per unit of t; length: that of the interval, in unit distances; light: share of the light
-     * that passes from the current subinterval to the interval's begin */
+    /* per_t: unit distances per unit of t; length: length of the interval, in unit distances; light: share of the light
+     * that passes from the begin of the current subinterval to the begin of the interval */
     double per_t, length, light;
-    int64_t *map_failures; /* counts points at which the map was not inverted */
+    int64_t *map_failures; /* counts the points at which the inversion of the cell's map failed */
     int count;             /* number of segments so far */
 } kernel_bisection;
 
@@ -207,8 +207,8 @@ static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_sub
 }
 
 /* Returns an upper bound of the error of light if the subinterval becomes one segment. s: bounds of the transfer
- * function over its values; length: in unit distances; *all: an upper bound for any deviation of the field from its
- * chord. */
+ * function over its values; length: its length in unit distances; *all: becomes an upper bound of the error that holds
+ * for any deviation of the field from its chord. */
 static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, double *all)
 {
@@ -241,8 +241,8 @@ static void kernel_range_between_steps(const kernel_bisection *h, double inside,
     int n = 0;
     side[0] = -3e38f, side[1] = 3e38f;
     for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_rounded_step(steps[n]);
-    /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
-     * there */
+    /* a segment whose values all equal a step's value counts as above the step, so the range ends just below the step,
+     * and rounding moves no other segment there */
     if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_rounded_step(steps[n]), side[0]);
 }
 
@@ -281,9 +281,9 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
                                  vf_set((float)rest[1])};
 }
 
-/* Adds the subinterval as a segment whose field is the chord. Equal segments are raised so that their mean is that of
- * the field (kernel_local_budget.h). This one is not, because it might then reach values for which no error bound has
- * been computed. */
+/* Adds the subinterval as a segment that has the field's values at its ends. Segments of equal length are raised so
+ * that their mean is that of the field (kernel_local_budget.h). A segment of the bisection is not raised, because it
+ * might then reach values for which no error bound has been computed. */
 static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {

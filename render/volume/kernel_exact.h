@@ -160,7 +160,8 @@ SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_face *faces, int
     return (c[0] + c[1] * u) + c[2] * v;
 }
 
-/* Computes the points of rays in the planes of the faces with the given numbers. lane: lane of each ray's tet. */
+/* Computes the points at which rays meet the planes of faces of their tets. face: index of each ray's face in its tet;
+ * lane: lane of each ray's tet. */
 SIMD_INLINE void kernel_double_compute_points(const kernel_double_face *faces, vi face, vi lane, const kernel_f64 u[2],
                                               const kernel_f64 v[2], kernel_double_points *out)
 {
@@ -187,9 +188,9 @@ SIMD_INLINE void kernel_round_doubles(const kernel_f64 value[2], vf *v, vf *rest
     *rest = kernel_halves_narrow(lost);
 }
 
-/* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double, on
- * the rays that see none of the two crossed faces edge on. The length is in units of t. lane: lane of each ray's tet;
- * first, second: numbers of the crossed faces; u, v: of the rays. */
+/* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double. Rays
+ * that see one of the two crossed faces edge on keep those in float32. The length is in units of t. lane: lane of each
+ * ray's tet; first, second: indices of the crossed faces in the tet; u, v: parameters of the rays. */
 SIMD_INLINE void kernel_double_segments(const kernel_double_face *faces, vi lane, vi first, vi second,
                                         const kernel_f64 u[2], const kernel_f64 v[2], kernel_unit_segment *run)
 {

@@ -51,8 +51,8 @@ static const struct {
                    {0.30026319f, 0.22222222f, -0.022485417f},
                    {0.26798833f, 0.48042111f, 0.13888889f}}};
 
-/* Returns -ln(1 - a) with a relative error of 3e-7, for a in [0, 1]. clear: 1 - a, rounded or better. If a is small,
- * the rounding error of clear is corrected to first order. */
+/* Returns -ln(1 - a) with a relative error of 3e-7, for a in [0, 1]. clear: 1 - a, rounded to float32 or more accurate
+ * than that. If a is small, the rounding error of `clear` is corrected to first order. */
 SIMD_INLINE vf kernel_extinction(vf a, vf clear)
 {
     const vf rest = vf_select(vf_lt(a, vf_set(0.5f)), (1.0f - clear) - a, vf_set(0));
@@ -115,15 +115,16 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_
     return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* The piece of the transfer function that contains each ray's current value (at: its index). If it is the same piece
- * for all rays, `common` points to it, which saves gathers; otherwise `common` is NULL. */
+/* The piece of the transfer function that contains each ray's current value. at: index of the piece. common: if all
+ * rays have the same piece, points to it, which saves gathers; otherwise NULL. */
 typedef struct kernel_piece_index {
     vi at;
     const kernel_real *common;
     vf low, high, low_rest, high_rest; /* values at the piece's two ends, and their rounding errors */
 } kernel_piece_index;
 
-/* Returns the given pieces without their ends. piece: index of each ray's piece. */
+/* Returns a kernel_piece_index for the pieces with the given indices; the values at the pieces' ends are not set.
+ * piece: index of each ray's piece, as a float. */
 SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm rays, vf piece)
 {
     const int lane = __builtin_ctz(vm_bits(rays));

@@ -73,12 +73,12 @@ enum { KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
 
 /* ---- cells ---- */
 
-/* Computes, for the cell in each lane, the members of *out that depend on the range of its values: `low`, `high` and
- * the members that follow from them, and `tolerance`. `sensitivity` and `residual_limit` must be set. values: the field
- * at the cells' vertices, by vertex and lane. The bounds must also hold at the ends of segments, which may lie outside
- * of the vertices' values. If there is one segment, its ends exceed them by at most 3/16 of the values' range
- * (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the quadratic part's
- * maximum, which is less than that. */
+/* Computes, for the cell in each lane, the bounds that depend on the range of its values: the members low, high, cost,
+ * error_variation, weight_change, extinction and tolerance of *out. `sensitivity` and `residual_limit` must be set.
+ * values: the field at the cells' vertices, by vertex and lane. The bounds must also hold at the ends of segments,
+ * which may lie outside of the vertices' values. If there is one segment, its ends exceed them by at most 3/16 of the
+ * values' range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the quadratic
+ * part's maximum, which is less than that. */
 SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
                                          kernel_local_bounds *out)
 {
@@ -99,16 +99,16 @@ SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, cons
     vf_store(out->extinction, light[KERNEL_LIGHT_EXTINCTION]);
     vf_store(out->low, low);
     vf_store(out->high, high);
-    /* the residual of Newton's method may cause a share of that error of light which is allowed for the ray's length
-     * alone */
+    /* the residual of Newton's method may cause the share KERNEL_LOCAL_SLACK of the error of light that is allowed in
+     * proportion to the ray's length */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * f->allowance / f->reach[volume]) / (cost * vf_load(out->sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(out->residual_limit));
     vf_store(out->tolerance, tolerance);
 }
 
-/* Computes the bounds of a cell whose map is too nonlinear for processing in lanes, the same in all lanes. Its
- * derivatives are not bounded, so the bend is taken as 1, and the sum of the nonlinear terms' slopes as the range of
- * the values. */
+/* Computes the bounds of a cell whose map is too nonlinear for processing in lanes; all lanes of *out get the same
+ * bounds. The map's derivatives are not bounded. `bend` is therefore taken as 1, and the range of the values takes the
+ * place of S, the sum of the nonlinear terms' slopes. */
 SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
                                             kernel_local_bounds *out)
 {

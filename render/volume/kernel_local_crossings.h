@@ -23,7 +23,8 @@
 /* ---- cells ---- */
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
- * the blocks that are `apart` (4 or 8) vectors and lanes away from each other. number: the lanes' numbers 0 to 15. */
+ * the blocks that are `apart` (4 or 8) vectors and lanes away from each other. number: the index of each lane, 0 to
+ * 15. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -35,8 +36,8 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
     }
 }
 
-/* Stores row number `row` of the numbers of every lane's cell (out->rows), by transposing two lists of up to 8 vectors
- * each, in which lanes are cells. */
+/* Stores row `row` of out->rows for the cells of all lanes, by transposing two lists of up to 8 vectors each, in which
+ * lanes are cells. The first list fills the first half of the row, the second list the other half. */
 SIMD_INLINE void kernel_local_store_row(const float (*first)[SIMD_WIDTH], int first_count,
                                         const float (*second)[SIMD_WIDTH], int second_count, int row,
                                         kernel_transformed_curved *out)
@@ -72,8 +73,8 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
     }
 }
 
-/* Computes what rays need of the faces of all lanes' cells: the order of their corners, and which quads may look
- * nonconvex. Positions, ranks and field must be set in *cells. ends: first and last column and row of each cell
+/* Computes, for the faces of all lanes' cells, the order of their corners, and which quads may look nonconvex along a
+ * ray. Positions, ranks and field must be set in *cells. ends: first and last column and row of each cell
  * (kernel_local_pixels()). */
 SIMD_INLINE void kernel_local_compute_faces(const kernel_tile *tile, kernel_transformed_curved *cells,
                                             int32_t ends[4][SIMD_WIDTH], int type)
@@ -125,10 +126,10 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells,
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
 }
 
-/* Reads the corners of both faces of each ray by permutations of its cell's rows, which requires that the given rays
- * have at most two different cells. Most vectors of 16 rays have, because rays are listed cell by cell. One permutation
- * of the two cells' rows reads a number of a vertex for each ray. Returns false if there are more cells, or not 16
- * lanes. */
+/* Reads the corners of the two faces that each ray crosses, if the given rays have at most two different cells. Then
+ * one permutation of the two cells' rows reads one number of a vertex for all rays. Most vectors of 16 rays have at
+ * most two cells, because rays are listed cell by cell. Returns false if there are more cells, or if vectors do not
+ * have 16 lanes. */
 SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *cells, const kernel_lane_rays *own,
                                               vm rays, const vi face[2], kernel_curved_corners out[2])
 {
@@ -141,7 +142,7 @@ SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *c
     const vf lane = vf_from_vi(own->lane);
     const vm in_first = vf_eq(lane, vf_set((float)first)), in_last = vf_eq(lane, vf_set((float)last));
     if (vm_any(vm_andnot(rays, vm_or(in_first, in_last)))) return false;
-    /* added to the index of a permutation: SIMD_WIDTH for rays whose cell is the second one */
+    /* added to the indices of a permutation of two rows: 0 selects the first cell's row, SIMD_WIDTH the second one's */
     const vi second = vi_select(in_first, vi_set(0), vi_set(SIMD_WIDTH));
     const float(*const rows[2])[KERNEL_LOCAL_ROW] = {cells->rows[first], cells->rows[last]};
     for (int k = 0; k < 2; k++) {

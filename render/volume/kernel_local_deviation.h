@@ -56,8 +56,8 @@ typedef struct kernel_local_bounds {
     float terms[KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* square of the upper bound N of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
-    /* lower bound of what is taken as the quartic part E of the field's deviation (kernel_local_budget.h), because the
-     * three inner places may not show it */
+    /* e N^2 S of kernel_local_budget.h, a lower limit of E, the quartic part of the field's deviation. It covers
+     * deviations that do not show at the three inner places. */
     float unsampled[SIMD_WIDTH];
     float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
@@ -77,12 +77,14 @@ typedef struct kernel_local_pairs {
     kernel_lane_rays rays;
     kernel_point ends[2]; /* begin and end of the interval */
     vm active;
-    vf begin;        /* depth at which the ray's window begins */
-    vf per_t;        /* unit distances of the transfer function per unit of t */
-    vf count;        /* number of segments into which the interval is divided */
-    float share;     /* length of this interval as a share of the ray's whole interval in its cell */
-    vf field[3];     /* deviation of the field at a quarter, the middle and three quarters of the interval */
-    vf residual;     /* largest residual at these places, and at those of the parts that contain this one */
+    vf begin;    /* depth at which the ray's window begins */
+    vf per_t;    /* unit distances of the transfer function per unit of t */
+    vf count;    /* number of segments into which the interval is divided */
+    float share; /* length of this interval as a share of the ray's whole interval in its cell */
+    vf field[3]; /* deviation of the field at a quarter, the middle and three quarters of the interval */
+    /* largest residual at the inner places of this interval and, if it is a part, of the larger parts that contain
+     * it */
+    vf residual;
     vm has_diverged; /* rays for which Newton's method did not find the reference coordinates */
 } kernel_local_pairs;
 
@@ -94,14 +96,15 @@ SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* Returns the factor e of kernel_local_budget.h, by which the part of the field's deviation is bounded that the three
- * inner places may miss. */
+/* Returns the factor e of kernel_local_budget.h. It bounds the part of the field's deviation that does not show at the
+ * three inner places. */
 SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
 
-/* Computes the members of *out from `terms` to `residual_limit`. */
+/* Computes those bounds that depend only on the cells' maps and fields: the members terms, bend, unsampled, sensitivity
+ * and residual_limit of *out. */
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_bounds *out)
 {
     vf most = vf_set(0);
@@ -142,7 +145,7 @@ typedef struct kernel_local_chord {
 typedef struct kernel_local_places {
     float u, width;     /* u: position at which the part begins; width: its length, as a share of the whole interval */
     vf r[5][3], off[5]; /* r: reference coordinates; off: the field minus the chord of the whole interval */
-    vf residual;        /* largest residual at these places, and at those of the parts that contain this one */
+    vf residual;        /* largest residual at the inner places of this part and of the larger parts that contain it */
     vm is_known;        /* rays for which Newton's method found all reference coordinates */
 } kernel_local_places;
 
@@ -199,10 +202,10 @@ SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int ty
     for (int k = 1; k < kernel_nonlinear_count(type); k++) p->value = vf_muladd(c->own[k], term[k], p->value);
 }
 
-/* Refines the reference coordinates at[i].r at `count` positions u on the interval (at most 3), from initial guesses,
- * by Newton's method; places[i]: position i. at[i].value becomes the field's deviation. *residual becomes the largest
- * residual that is left at any of them. Returns the rays for which r is valid at all of them: in the cell or slightly
- * outside, with a small enough residual. */
+/* Refines reference coordinates by Newton's method, at `count` (at most 3) positions on the interval. places[i]:
+ * position u number i; at[i].r: its reference coordinates, on entry an initial guess. at[i].value becomes the field's
+ * deviation there. *residual becomes the largest residual that is left at any position. Returns the rays for which all
+ * at[i].r are valid: in the cell or slightly outside, with a small enough residual. */
 SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places, int count, vm rays, int type,
                                    kernel_point *at, vf *residual)
 {
@@ -235,8 +238,8 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
     }
 }
 
-/* Evaluates the field at the inner places with the numbers 1, 1 + step and so on up to 3, from guesses of their
- * reference coordinates in p->r. ends: the ends of the whole interval. */
+/* Evaluates the field at the inner places 1, 2 and 3 if `step` is 1, and at the places 1 and 3 if it is 2. On entry,
+ * p->r has guesses of the places' reference coordinates. ends: the ends of the whole interval. */
 SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int step, vm rays,
                                        int type, kernel_local_places *p)
 {
@@ -284,7 +287,8 @@ SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kerne
     kernel_local_evaluate(c, ends, 1, rays, type, out);
 }
 
-/* Evaluates the field at the five places of one half (0 or 1) of the part p. Three of them are places of the part. */
+/* Evaluates the field at the five places of one half (0 or 1) of the part p. Three of these places are places of p, at
+ * which the field is already known. */
 SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const kernel_point ends[2],
                                            const kernel_local_places *p, int half, vm rays, int type,
                                            kernel_local_places *out)
@@ -308,8 +312,9 @@ SIMD_INLINE vf kernel_local_interpolate(vf first, vf last, float u)
     return last;
 }
 
-/* Makes *out the rays with a part of their intervals: the part's ends, and the field's deviations from the chord
- * between these. whole: the rays with their whole intervals; p: the part's places; rays: the active ones. */
+/* Sets *out to a copy of *whole that is restricted to one part of the rays' intervals: to the part's ends, and the
+ * field's deviations from the chord between them. whole: the rays with their whole intervals; p: the part's places;
+ * rays: the active rays. */
 SIMD_INLINE void kernel_local_make_part(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
                                         kernel_local_pairs *out)
 {
@@ -341,8 +346,8 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     for (int i = 0; i < 3; i++) p->field[i] = places.off[i + 1];
 }
 
-/* Computes *out, the ray's point at depth t on its interval between `ends`, for the given rays. Returns the rays for
- * which Newton's method did not find its reference coordinates. */
+/* Computes *out, the point at depth t on each of the given rays, between the ends of the ray's interval (`ends`).
+ * Returns the rays for which Newton's method did not find the point's reference coordinates. */
 SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
                                      kernel_point *out)
 {

@@ -46,16 +46,16 @@ typedef struct kernel_local_queue {
 
 enum { KERNEL_SORT_ENDS = 48 };
 
-/* The pairs of a ray and a tet, of the vector of tets that is being processed, which may meet, in vectors of SIMD_WIDTH
- * pairs (kernel_tet_pairs_next()). First come the pairs of small tets, which kernel_tile_cells.rays lists one after the
- * other. Then each larger tet is paired with the rays of one packet after the other. */
+/* The pairs of a ray and a tet that may meet, for the tets of the current vector. They are processed SIMD_WIDTH pairs
+ * at a time (kernel_tet_pairs_next()). First come the pairs of small tets, which are listed in kernel_tile_cells.rays.
+ * Then each larger tet is paired with all rays of one packet after the other. */
 typedef struct kernel_tet_pairs {
-    int next;                    /* index of the first listed pair that is left */
-    unsigned large;              /* mask of the lanes of larger tets that are left */
+    int next;                    /* index of the first listed pair that has not been processed */
+    unsigned large;              /* mask of the lanes whose larger tets have not been paired yet */
     uint16_t blocks[SIMD_WIDTH]; /* for each larger tet, the blocks in which it may be visible */
     int lane;                    /* lane of the current larger tet */
-    unsigned left;               /* those of its blocks that are left */
-    int packet;                  /* packet of the current vector's rays; -1 if its pairs are listed */
+    unsigned left;               /* mask of the current larger tet's blocks that have not been paired yet */
+    int packet; /* index of the packet whose rays are being processed; -1 while listed pairs are processed */
 } kernel_tet_pairs;
 
 /* The cells of a volume in the tile: candidates, queued cells of a mesh part, and the cells that are being processed.
@@ -75,14 +75,14 @@ typedef struct kernel_tile_cells {
     kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
     kernel_local_queue queues[KERNEL_LANE_TYPES];
     kernel_cell cell;                  /* the cell that packets are tracing */
-    kernel_map map;                    /* inverse map of that cell */
-    const kernel_map *cell_map;        /* points to that map; NULL if the cell's field is constant */
+    kernel_map map;                    /* inverse map of `cell` */
+    const kernel_map *cell_map;        /* points to `map`; NULL if the field of `cell` is constant */
     kernel_transformed_tets tets;      /* the vector of tets that is being processed */
-    kernel_tet_pairs tet_pairs;        /* its tets, paired with rays */
-    const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */
+    kernel_tet_pairs tet_pairs;        /* pairs of a ray and one of `tets` */
+    const kernel_local_queue *current; /* queue from which the cells in `curved` come */
     /* the current vector of hexes, wedges or pyramids in tile space; affine edge functions are not set */
     kernel_transformed_curved curved;
-    kernel_local_cells maps; /* their maps */
+    kernel_local_cells maps; /* the maps of the cells in `curved` */
     /* per lane: first and last column, first and last row of the tile's pixels in which the lane's cell may be visible
      * (kernel_local_pixels()) */
     int32_t pixel_ends[4][SIMD_WIDTH];

@@ -45,27 +45,31 @@ typedef struct kernel_tile_volume {
     int first, count; /* number of the window's first sample on its ray; number of samples in the window */
     float pad;        /* error bound of sample numbers, as in kernel_samples */
     /* steps: for each ray, by packet and lane, the depth of sample number 0 and the distance between samples in depth,
-     * side by side; far: the depth at which the window ends on the ray, -inf for inactive rays */
+     * side by side; far: the depth at which the ray ends (its nearest opaque hit), -inf for inactive rays */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
     /* listed samples, whose values are still to be computed: depth and word of each */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
     /* The members from here on choose the depth of windows (kernel_tile_depth.h). A ray is dark if it has no light left
      * (KERNEL_DARK); depths are in units of t. */
-    /* Depth, relative to the begin of the last tile, at which the last tile became dark: at least half of its rays that
-     * had lost light were dark. +inf if it did not become dark. */
+    /* Depth at which the previous tile became dark, relative to that tile's `begin`; +inf if it did not. A tile becomes
+     * dark when at least half of its rays that have lost light are dark. */
     float dark;
     /* The following members describe the current tile. */
     float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
-    float begin;    /* depth of the first cell if it is known, else of the first sample; +inf before any sample */
-    bool has_met;   /* set if some ray of the tile has lost light */
+    /* depth of the first cell if it is known, else the least depth of samples on rays that have lost light; +inf before
+     * that */
+    float begin;
+    bool has_met; /* set if some ray of the tile has lost light */
     /* expected further depth until the rays are dark, computed from the light left after the last window */
     float expected;
     float before; /* light of the brightest ray at the begin of the last window */
-    /* number of the last window's rays that have lost light, and number of those that are dark */
+    /* Collected from the packets after a window (kernel_depth_add_packet()): number of rays that have lost light, and
+     * number of those among them that are dark. */
     int lit_count, dark_count;
-    /* brightest: most light that one of these rays has left; first_lit: least depth of their samples; last_dark:
-     * greatest depth at which one of them became dark */
+    /* Collected in the same way. brightest: largest light that is left on a ray that has lost light but is not dark;
+     * first_lit: least depth of samples on rays that have lost light; last_dark: greatest depth at which a ray became
+     * dark. */
     float brightest, first_lit, last_dark;
 } kernel_tile_volume;
 
@@ -105,8 +109,8 @@ SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, v
     return taken;
 }
 
-/* Stores, for the samples in the given lanes, the ends of their rays' intervals in their cells (kernel_samples).
- * places, numbers: as above. */
+/* Stores the ends of the rays' intervals in their cells (kernel_samples.t_in and t_out) for the samples in the given
+ * lanes. places: position of each ray among the tile's packets; numbers: the samples' indices in the window. */
 static __attribute__((noinline, cold)) void kernel_local_store_contact(kernel_tile_volume *v, unsigned lanes, vi places,
                                                                        vi numbers, vf t_in, vf t_out)
 {
@@ -232,8 +236,8 @@ static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, int type, uns
     return kernel_local_transform(t, t->thread->tile_cells, KERNEL_LOCAL_BENT, lanes, type);
 }
 
-/* Copies from the packets of the given blocks, which must be set up, what sampling a volume in a window needs, by
- * pixel. */
+/* Prepares the sampling of a volume in a window. Copies, from the packets of the given blocks, which must be set up,
+ * the rays' samples and ends into the arrays by packet and lane that functions for samples in lanes read. */
 SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_tile_volume *b, unsigned blocks,
                                             int volume)
 {

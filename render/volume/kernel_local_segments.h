@@ -34,9 +34,9 @@
  * bit KERNEL_LOCAL_CELL, and the indices of the two crossed faces, three bits each, at bit KERNEL_LOCAL_FACES. */
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
-/* Lists of rays that have passed a stage: those that may meet their cells (KERNEL_LOCAL_MET), and those that cross two
- * faces. The latter are listed apart by whether the first crossed face is a quad (KERNEL_LOCAL_CROSSED) or a triangle.
- */
+/* Lists of rays. KERNEL_LOCAL_MET: rays that may meet their cells. The other two have the rays that cross two faces of
+ * their cells: KERNEL_LOCAL_CROSSED if the face with the smaller index is a quad, KERNEL_LOCAL_CROSSED_TRIANGLE if it
+ * is a triangle. */
 enum { KERNEL_LOCAL_MET, KERNEL_LOCAL_CROSSED, KERNEL_LOCAL_CROSSED_TRIANGLE, KERNEL_LOCAL_LISTS };
 
 /* The segments of a tile's rays in a window, and the state of the vector of cells that is being processed. */
@@ -49,9 +49,9 @@ typedef struct kernel_tile_segments {
     kernel_local_bounds bounds;      /* error bounds of the current vector of cells */
     bool is_double;                  /* set if the ends of segments are stored in double */
     bool has_cuts;                   /* set if transparent surfaces cut segments */
-    bool has_overflowed;             /* set if a ray has more such cuts than kernel_hits stores */
+    bool has_overflowed;             /* set if a ray crosses more transparent surfaces than kernel_hits stores */
     int list_count[KERNEL_LOCAL_LISTS];
-    float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* one word per ray */
+    float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* the words that describe the listed rays */
     /* For each ray, by packet and lane, depths side by side: begin and end of the ray's window (window), and begin and
      * end of the part of the ray in which segments lie (reach). */
     float window[2 * KERNEL_TILE_PIXELS], reach[2 * KERNEL_TILE_PIXELS];
@@ -63,7 +63,9 @@ typedef struct kernel_tile_segments {
 
 /* ---- surfaces that cut segments ---- */
 
-/* Does the same as kernel_local_next_cut(), if rays may have more cuts than kernel_hits stores. */
+/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
+ * none. It works ray by ray, and is used if rays may cross more transparent surfaces than kernel_hits stores. places:
+ * position of each ray among the tile's packets. */
 static __attribute__((noinline, cold)) vf
 kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
 {
@@ -98,9 +100,9 @@ static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trac
     return next;
 }
 
-/* Adds the segments of the given rays, on whose intervals i the field is linear. It cuts the intervals at surfaces, and
- * adds the parts between the depths reach[0] and reach[1] that begin in the rays' windows. places: position of each ray
- * among the tile's packets; whole: the intervals as segments. */
+/* Cuts intervals of rays at surfaces, and adds the resulting segments that lie between the depths reach[0] and reach[1]
+ * and begin in the rays' windows. i: the intervals of the given rays, on which the field must be linear; whole: the
+ * same intervals as segments; places: position of each ray among the tile's packets. */
 static __attribute__((noinline)) void kernel_linear_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
                                                              vi places, vm rays, const kernel_interval *i,
                                                              const vf reach[2], const kernel_unit_segment *whole)
@@ -178,7 +180,7 @@ static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segm
     }
 }
 
-/* Adds the segments of the given rays, whose numbers are p->count. */
+/* Adds the segments of the given rays; p->count has the number of segments of each ray. */
 SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
@@ -191,9 +193,9 @@ SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_p
 static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
                                                  const vf reach[2], float share);
 
-/* Adds the segments of the rays' intervals. Each interval is halved, and its parts again, until the error bounds allow
- * enough few segments in a part (kernel_local_count()). The shortest parts for which they do not are passed on: from
- * vectors of cells to packets, and from packets to bisection in double. */
+/* Adds the segments of the rays' intervals. An interval is halved, and its parts again, until the error bounds allow a
+ * part to be divided into a few equal segments (kernel_local_count()). The shortest parts for which they do not allow
+ * it are passed on: from vectors of cells to packets, and from packets to bisection in double. */
 SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
                                                const kernel_local_chord *chord, const kernel_local_pairs *whole,
                                                vm rays, int type)
@@ -208,8 +210,8 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
         kernel_local_make_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
-        /* if packets process a cell, nothing bounds the deviation that the three inner places of the whole interval
-         * miss, so that it is always halved */
+        /* if packets process a cell, the whole interval is always halved, because there is no bound of the deviation
+         * that does not show at its three inner places */
         const vm good = type == GRID_NO_TYPE && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
         kernel_local_emit(b, &part, good);
@@ -238,7 +240,8 @@ SIMD_INLINE void kernel_local_segments_parts_of(kernel_tile_trace *t, const kern
     kernel_local_divide_intervals(t, bounds, &chord, whole, rays, type);
 }
 
-/* Does the same as kernel_local_divide_intervals(), for rays in the current vector's cells. */
+/* Adds the segments of the intervals of the given rays in the current vector's cells
+ * (kernel_local_divide_intervals()). */
 static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_trace *t, const kernel_local_pairs *whole,
                                                                   vm rays, int type)
 {
@@ -429,8 +432,8 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
         kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone), reach, 1);
 }
 
-/* Adds those of the rays from index n on of the list of pixels to KERNEL_LOCAL_MET that may meet their cells within the
- * window. */
+/* Adds rays to the list KERNEL_LOCAL_MET: of the vector of rays that begins at index n of the list of pixels, those
+ * that may meet their cells within the window. */
 SIMD_INLINE void kernel_local_segments_list_met(const kernel_tile_trace *t, const kernel_tile_cells *cells,
                                                 kernel_tile_segments *b, int n)
 {
@@ -469,7 +472,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* ---- cells ---- */
 
-/* Computes what segments need of the current vector of cells: their faces and error bounds. */
+/* Computes the faces and the error bounds of the current vector of cells, which the functions for segments use. */
 SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                kernel_tile_segments *s, int type)
 {
@@ -521,8 +524,9 @@ static void kernel_local_segments_finish(kernel_tile_trace *t, int unused)
     kernel_blocks_shorten(t, t->thread->tile_segments->blocks);
 }
 
-/* Copies what segments in lanes need of each ray from the packets of the given blocks into arrays by pixel: its window,
- * and the part of the ray in which segments lie. */
+/* Prepares segments of a volume in a window. Copies, from the packets of the given blocks, each ray's window and the
+ * part of the ray in which segments lie into the arrays by packet and lane that functions for segments in lanes
+ * read. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_segments *b, unsigned blocks,
                                         int volume)
 {

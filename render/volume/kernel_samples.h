@@ -101,11 +101,12 @@ SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_sample
     *end = (int)last;
 }
 
-/* Emits one sample per ray of `mask` as a fragment of its own, if it lies in front of opaque surfaces. t, value: its
- * depth and value; cell: the ray's interval in the sample's cell. With separate_samples (render.h) this is done with
- * all samples. Otherwise it is done because another cell already contains the sample, and marks the ray as one on which
- * cells overlap. Then only the nearest such sample is emitted, because others may be behind another rank's opaque
- * surface, and a clear fragment is emitted with it, so that the two fragments overlap. */
+/* Emits one sample per ray of `mask` as a fragment of its own, if it lies in front of opaque surfaces. t, value: depth
+ * and value of the sample; cell: the ray's interval in the sample's cell. With separate_samples (render.h) all samples
+ * are emitted in this way. Without it, only a sample that another cell contains, too, is emitted, to mark the ray as
+ * one on which cells overlap. A clear fragment at the same depth is then emitted with it, so that the two fragments
+ * overlap. Only the nearest such sample of a ray is emitted, because others may be behind another rank's opaque
+ * surface. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_samples *s,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
@@ -190,9 +191,10 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* Emits one sample or segment per ray in `has` as a fragment of its own, which render_fold.c joins with others later,
- * and marks those in front of which another rank may have fragments. The ray's current fragment then has no light of
- * its own, so that nothing is emitted when it ends. */
+/* Emits one sample or segment per ray in `has` as a fragment of its own; render_fold.c later joins it with others. If
+ * it is the first after the begin of the ray or after a surface or gap, it is marked FRAGMENT_EARLY, because another
+ * rank may have fragments in front of it. The light is not added to *b, so that nothing is emitted when the ray's
+ * current fragment ends. */
 SIMD_INLINE void kernel_emit_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
                                       vf clear)
 {
@@ -211,8 +213,9 @@ SIMD_INLINE void kernel_emit_separate(kernel_packet *p, kernel_blend *b, vm has,
     b->open = vm_or(b->open, has);
 }
 
-/* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added: a surface lies
- * between, or may lie there on another rank. */
+/* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added. A transparent
+ * surface lies between the two, or another rank's surface may lie there, because the sample's cell does not touch that
+ * of the previous sample. */
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples *s, int n, const kernel_hits *hits,
                                    vf t)
 {

@@ -200,8 +200,9 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
     return vf_gather(list->items[0][0] + member, item);
 }
 
-/* Returns those rays in `same` on which the segment `item` must come before the segment `earlier`: both begin at the
- * same depth, and `item` ends in front of `earlier`'s end, because its length is 0 in float32. */
+/* Returns those of the rays in `same` on which the segment `item` must come before the segment `earlier`. On the rays
+ * in `same` both begin at the same depth. `item` must come first if it ends in front of the end of `earlier`, because
+ * its length is then 0 in float32. */
 static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kernel_segments *list, vm same, vi item,
                                                                       vi earlier)
 {
@@ -281,9 +282,9 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
     return out;
 }
 
-/* Returns where the part of a segment that begins at `from` ends, so that compositing can mix it. Positions are shares
- * of the segment's length. share: length of a part (kernel_mixed_share()); parts also end where the opacity has a step.
- */
+/* Returns the end of a part of a segment, for segments that are divided into parts so that compositing can mix them.
+ * The part begins at `from`; both ends are shares of the segment's length. share: length of a part
+ * (kernel_mixed_share()). A part also ends where the opacity has a step. */
 SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
 {
     const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);

@@ -40,8 +40,8 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
-    /* set if the packets' rays are the tile's own primary rays (kernel_packet.is_pencil), for which cells need edge
-     * functions */
+    /* set if edge functions on the packets' rays are computed from lines (kernel_packet.is_pencil), which must then be
+     * computed for each cell */
     bool is_pencil;
     /* Processes a cell with the rays of the packet with this index: the polyhedron c or, if c is NULL, the tile's
      * current cell (kernel_tile_cells.cell), a hex, wedge or pyramid. */
@@ -130,8 +130,8 @@ static __attribute__((noinline, cold)) void kernel_transformed_set_cell_values(k
     for (int i = 1; i < 4; i++) memcpy(transformed->values[i], transformed->values[0], sizeof transformed->values[i]);
 }
 
-/* Transforms the first `count` tets of the queue. Reduces their masks of blocks to those with a ray that has no nearer
- * end, and returns the lanes of the visible tets for which a block is left. */
+/* Transforms the first `count` tets of the queue. From each tet's mask of blocks, removes blocks whose rays all end in
+ * front of the tet. Returns the lanes of the visible tets for which a block is left. */
 SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
                                                 int count)
 {
@@ -158,8 +158,9 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     return lanes;
 }
 
-/* Maximum number of pixels in the box of a small tet, whose pixels are listed, because it would leave most lanes of a
- * packet idle. In larger tets, packets fill as many lanes, and store samples by whole vectors. */
+/* Maximum number of pixels in the box of a small tet. The pixels of small tets are listed, because a packet would leave
+ * most lanes idle. Larger tets are traced by whole packets, which fill as many lanes as a list does, and store samples
+ * by whole vectors. */
 enum { KERNEL_TET_PIXELS = 32 };
 
 _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");

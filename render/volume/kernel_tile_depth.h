@@ -50,8 +50,8 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_volume *d, float begin)
     kernel_depth_begin_window(d);
 }
 
-/* Returns the depth (length) of the next window, which begins at the depth `at`: an eighth more than up to the depth at
- * which the tile is expected to be dark. */
+/* Returns the depth (length) of the next window, which begins at the depth `at`: 9/8 of the distance from there to the
+ * depth at which the tile is expected to be dark. */
 SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
@@ -80,7 +80,7 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_volume *d, float depth)
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first_lit, d->begin);
     d->has_met = d->has_met || d->lit_count;
-    /* the depth of the last tile is a poor estimate, because this tile has no sample yet */
+    /* no ray of this tile has lost light yet, so the depth at which the previous tile became dark is a poor estimate */
     if (d->begin == INFINITY) d->dark *= 2;
     if (d->own_dark == INFINITY && d->dark_count > 0 && 2 * d->dark_count >= d->lit_count)
         d->own_dark = d->last_dark - d->begin;

@@ -76,7 +76,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int packet, const po
 /* ---- tets ---- */
 
 /* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double.
- * lanes: lane of each ray's tet; first, second: numbers of the two faces that it crosses. */
+ * lanes: lane of each ray's tet; first, second: indices of the two faces that the ray crosses. */
 static __attribute__((noinline)) void kernel_tet_segments_refine(const kernel_tile_segments *s, vi places, vi lanes,
                                                                  vi first, vi second, kernel_unit_segment *run)
 {
@@ -154,8 +154,8 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->capacity = list->is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
 }
 
-/* Prepares the packet and its lists for one volume: sets the error limits and the unit distances, and begins the first
- * window at the rays' begin. */
+/* Prepares the packet and its lists for one volume: sets the volume's transfer function, its unit distances and the
+ * error limit, and lets the first window begin where the rays begin. */
 SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
@@ -201,8 +201,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     kernel_tile_process_window(t, volume, blocks);
 }
 
-/* Chooses the next window's depth (s->depth) from the numbers of segments in this window, so that the longest list will
- * be three quarters full. begin, end: depths at which this window begins and ends. */
+/* Chooses the next window's depth (s->depth) from the largest number of segments that a ray has in this window, so that
+ * the longest list will be three quarters full. begin, end: depths at which this window begins and ends. */
 SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
                                                    float end)
 {

@@ -117,7 +117,9 @@ static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
         } else if (vm_any(r.active)) {
             kernel_tet_rays_interval_in_one(&cells->tets, &r, cells->tet_pairs.lane, true, false, &i);
             if (!vm_any(i.mask)) continue;
-            const kernel_interval own = i; /* not `i`, which would then be kept in memory for listed pairs, too */
+            /* a copy, because passing the address of `i` would keep `i` in memory instead of registers, also for listed
+             * pairs */
+            const kernel_interval own = i;
             kernel_fill_interval_samples(&t->packets[packet], &b->packets[packet], NULL, &own, &own);
         }
     }
@@ -148,9 +150,10 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, f
     *last = highest > *last ? highest : *last;
 }
 
-/* Prepares the packet for a window: deactivates rays without light, and resets the values of all samples: to NaN or, if
- * every sample is emitted as a fragment of its own (separate_samples), to 0. Returns the farthest depth of its rays'
- * samples in the window, -inf if there are none; lowers *near to the least depth of samples. */
+/* Prepares the packet for a window. Deactivates rays on which no light is left, and rays that end in front of the
+ * window. Resets the values of all samples to NaN or, if every sample is emitted as a fragment of its own
+ * (separate_samples), to 0. Returns the greatest depth of the active rays' samples in the window; -inf if no ray is
+ * active. Lowers *near to the least depth of these samples. */
 SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
 {
     const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
@@ -189,7 +192,8 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     return true;
 }
 
-/* Returns the number of samples in the window that begins with sample number `first`. */
+/* Chooses the number of samples in the window that begins with sample number `first`: as many as are expected to
+ * receive light (kernel_depth_next_window()), at most job->sample_group. */
 SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const kernel_packet *p, int first)
 {
     enum { LEAST = 8 };

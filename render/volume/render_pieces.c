@@ -379,8 +379,9 @@ static void sum_up_variation(const value_variation *s, double contrast, float ou
     out[KERNEL_LIGHT_STEEPNESS] = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30);
 }
 
-/* Fills the table of bounds, which is indexed by the class of a range's width and by the bin in which the range begins.
- * A range of this class that begins anywhere in bin `first` ends in bin `wanted` or in front of it. */
+/* Fills the table of bounds. Its rows are classes of the widths of ranges of values, its columns the bins in which
+ * ranges begin. A range of the class `width` that begins anywhere in bin `first` ends in bin `wanted` or in front of
+ * it. */
 static void fill_variations(kernel_pieces *out, const double behind[2])
 {
     value_variation bins[KERNEL_VARIATION_BINS];

@@ -19,10 +19,10 @@ static const double most_units = 0x1p30;
 static const double steepest = 1e6; /* same value as KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
-/* Returns the number of bins for the error bound of a ray's light. The narrower the bins, the more segments are looked
- * up in the table: only those whose end values differ by more than a distance, which grows with the square of a bin's
- * width and falls with the error bound. At 1e-2 the table has 196 KB, so that it fits into a core's second-level cache
- * beside a tile's rays. */
+/* Returns the number of bins for the allowed error of a ray's light (max_error). Only segments whose end values differ
+ * by more than some distance are looked up in the table. This distance grows with the square of a bin's width and falls
+ * with the allowed error, so that narrower bins let more segments be looked up. At 1e-2 the table has 196 KB, so that
+ * it fits into a core's second-level cache beside a tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;
@@ -151,7 +151,8 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
  * of these infinite ranges is represented by one bin. low: value at which the other bins begin; count: their number. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
-    /* an invalid value, because a transmittance is never -1; the cache is empty at the beginning */
+    /* The last argument and result of get_cached_extinction(). -1 is never an argument, so that the cache is empty at
+     * first. */
     double last[2] = {-1, 0};
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
