@@ -298,7 +298,7 @@ SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
 
 /* Gathers a member of the tile's packets that has 32 bits per lane, for one ray per lane. at: positions of the rays
  * among the tile's packets (kernel_pixel_position()); of_first: address of the member in the first packet. */
-SIMD_INLINE vf kernel_gather_of_packets(const void *of_first, vi at)
+SIMD_INLINE vf kernel_gather_packet_member(const void *of_first, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
     return vf_gather((const float *)of_first, at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
@@ -319,7 +319,7 @@ typedef struct kernel_lane_rays {
 
 /* Sets the members lane, at and rays to the rays through the given pixels of the tile (16 * row + column). lane: lane
  * of each ray's cell. */
-SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
+SIMD_INLINE void kernel_lane_rays_through_pixels(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
 {
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
     out->lane = lane & (SIMD_WIDTH - 1);
@@ -336,7 +336,8 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
     const bool flat = t->frame->job->camera.is_orthographic;
     const int left = rays->count - first;
     out->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    kernel_lane_rays_of(out, &t->tile, kernel_load_bytes(rays->pixel + first), kernel_load_bytes(rays->lane + first));
+    kernel_lane_rays_through_pixels(out, &t->tile, kernel_load_bytes(rays->pixel + first),
+                                    kernel_load_bytes(rays->lane + first));
     out->u = flat ? out->rays.origin_x : out->rays.slope_x;
     out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }
@@ -346,12 +347,12 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
 SIMD_INLINE vf kernel_lane_rays_near(const kernel_tile_trace *t, const kernel_lane_rays *r)
 {
     if (__builtin_expect(t->frame->common_clips == 0, 1)) return vf_set(t->t_near);
-    return kernel_gather_of_packets(&t->packets[0].t_near, r->at);
+    return kernel_gather_packet_member(&t->packets[0].t_near, r->at);
 }
 
 SIMD_INLINE void kernel_lane_rays_set_far(kernel_lane_rays *r, const kernel_tile_trace *t)
 {
-    r->far = kernel_gather_of_packets(&t->packets[0].t_far, r->at);
+    r->far = kernel_gather_packet_member(&t->packets[0].t_far, r->at);
 }
 
 /* Returns the index in the tile of the packet that has a pixel (16 * row + column). */

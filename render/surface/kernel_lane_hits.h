@@ -56,9 +56,9 @@ SIMD_INLINE void kernel_packet_of_lane_rays(const kernel_tile_trace *t, const ke
     out->origin_y = r->rays.origin_y;
     out->slope_x = r->rays.slope_x;
     out->slope_y = r->rays.slope_y;
-    out->column = vi_from_bits(kernel_gather_of_packets(&first->column, r->at));
-    out->row = vi_from_bits(kernel_gather_of_packets(&first->row, r->at));
-    vi_store((int32_t *)out->pixel, vi_from_bits(kernel_gather_of_packets(first->pixel, r->at)));
+    out->column = vi_from_bits(kernel_gather_packet_member(&first->column, r->at));
+    out->row = vi_from_bits(kernel_gather_packet_member(&first->row, r->at));
+    vi_store((int32_t *)out->pixel, vi_from_bits(kernel_gather_packet_member(first->pixel, r->at)));
 }
 
 static __attribute__((noinline, cold)) vm kernel_lane_hits_kept_by_clips(const kernel_tile_trace *t,

@@ -105,7 +105,7 @@ SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
 
 /* Computes those bounds that depend only on the cells' maps and fields: the members terms, bend, unsampled, sensitivity
  * and residual_limit of *out. */
-SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_bounds *out)
+SIMD_INLINE void kernel_local_set_nonlinear_bounds(const kernel_local_cells *c, int type, kernel_local_bounds *out)
 {
     vf most = vf_set(0);
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
@@ -315,8 +315,8 @@ SIMD_INLINE vf kernel_local_interpolate(vf first, vf last, float u)
 /* Sets *out to a copy of *whole that is restricted to one part of the rays' intervals: to the part's ends, and the
  * field's deviations from the chord between them. whole: the rays with their whole intervals; p: the part's places;
  * rays: the active rays. */
-SIMD_INLINE void kernel_local_make_part(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
-                                        kernel_local_pairs *out)
+SIMD_INLINE void kernel_local_restrict_to_part(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
+                                               kernel_local_pairs *out)
 {
     const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
     *out = *whole;
@@ -348,7 +348,7 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
 
 /* Computes *out, the point at depth t on each of the given rays, between the ends of the ray's interval (`ends`).
  * Returns the rays for which Newton's method did not find the point's reference coordinates. */
-SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
+SIMD_INLINE vm kernel_local_point_at(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
                                      kernel_point *out)
 {
     const vf along = (t - ends[0].t) / (ends[1].t - ends[0].t), u = along - 0.5f;

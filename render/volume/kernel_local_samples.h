@@ -154,7 +154,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     kernel_lane_rays rays;
     kernel_local_points points;
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH], lane[SIMD_WIDTH];
-    kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
+    kernel_lane_rays_through_pixels(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
     const vm known = kernel_local_invert_maps(type, &cells->maps, rays.lane, place, &points);

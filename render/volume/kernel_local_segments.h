@@ -207,7 +207,7 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
     for (int count = 1; count > 0;) {
         const kernel_local_places places = stack[--count];
         kernel_local_pairs part;
-        kernel_local_make_part(whole, &places, mine[count], &part);
+        kernel_local_restrict_to_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
         /* if packets process a cell, the whole interval is always halved, because there is no bound of the deviation
@@ -347,7 +347,7 @@ SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_
         const vf between[2] = {from, vf_min(end, kernel_local_next_cut(t, b, whole->rays.at, open, from))};
         vm alone = vm_none();
         for (int n = 0; n < 2; n++)
-            alone = vm_or(alone, kernel_local_move_end(&chord, whole->ends, open, between[n], type, &part.ends[n]));
+            alone = vm_or(alone, kernel_local_point_at(&chord, whole->ends, open, between[n], type, &part.ends[n]));
         kernel_local_segments_parts(t, &part, vm_andnot(open, alone), type);
         if (__builtin_expect(vm_any(alone), 0))
             kernel_local_segments_process_singly(t, whole->rays.at, whole->rays.lane, vm_bits(alone), between, 1);
@@ -375,7 +375,7 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, c
     const int left = b->list_count[list] - n;
     const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     *words = vi_select(all, vi_from_bits(vf_load(b->list[list] + n)), vi_set(0));
-    kernel_lane_rays_of(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
+    kernel_lane_rays_through_pixels(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
     return all;
 }
 
@@ -449,7 +449,7 @@ SIMD_INLINE void kernel_local_segments_list_met(const kernel_tile_trace *t, cons
 }
 
 /* Processes the rays in the list KERNEL_LOCAL_MET: finds the crossed faces, then adds the segments. */
-SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
+SIMD_INLINE void kernel_local_segments_process_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
 {
     const int met = b->list_count[KERNEL_LOCAL_MET];
     b->list_count[KERNEL_LOCAL_CROSSED] = b->list_count[KERNEL_LOCAL_CROSSED_TRIANGLE] = 0;
@@ -459,14 +459,14 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_seg
 }
 
 /* Adds the segments of all rays in the list of pixels, and empties the list. */
-static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, int type)
+static __attribute__((noinline)) void kernel_local_segments_process_pixels(kernel_tile_trace *t, int type)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_segments *b = t->thread->tile_segments;
     kernel_pixel_list_pad(&cells->rays);
     b->list_count[KERNEL_LOCAL_MET] = 0;
     for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_segments_list_met(t, cells, b, n);
-    KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b);
+    KERNEL_OF_TYPE(type, kernel_local_segments_process_met, t, b);
     cells->rays.count = 0;
 }
 
@@ -477,7 +477,7 @@ SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kerne
                                                kernel_tile_segments *s, int type)
 {
     kernel_local_compute_faces(&t->tile, &cells->curved, cells->pixel_ends, type);
-    kernel_local_nonlinear_of(&cells->maps, type, &s->bounds);
+    kernel_local_set_nonlinear_bounds(&cells->maps, type, &s->bounds);
     kernel_local_set_bounds(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
 }
 

@@ -134,7 +134,7 @@ static const kernel_volume_method kernel_volume_by_segments = {
     .process_packet = kernel_tile_cell_segments,
     .process_tets = kernel_tet_segments,
     .transform = kernel_local_segments_transform,
-    .process_pixels = kernel_local_segments_cast,
+    .process_pixels = kernel_local_segments_process_pixels,
     .finish = kernel_local_segments_finish,
 };
 
@@ -156,7 +156,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
 
 /* Prepares the packet and its lists for one volume: sets the volume's transfer function, its unit distances and the
  * error limit, and lets the first window begin where the rays begin. */
-SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list, int volume)
+SIMD_INLINE void kernel_ray_segments_begin_volume(kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
     p->active = list->active;
@@ -223,7 +223,8 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
 SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                               int count, int volume, const kernel_placement *reach)
 {
-    for (int n = 0; n < count; n++) kernel_ray_segments_of(&t->packets[packets[n]], &s->packets[packets[n]], volume);
+    for (int n = 0; n < count; n++)
+        kernel_ray_segments_begin_volume(&t->packets[packets[n]], &s->packets[packets[n]], volume);
     for (;;) {
         const float front = kernel_tile_segments_front(t, s, packets, count);
         if (!(front < INFINITY)) break;

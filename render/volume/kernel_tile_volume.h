@@ -154,7 +154,7 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, f
  * window. Resets the values of all samples to NaN or, if every sample is emitted as a fragment of its own
  * (separate_samples), to 0. Returns the greatest depth of the active rays' samples in the window; -inf if no ray is
  * active. Lowers *near to the least depth of these samples. */
-SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
+SIMD_INLINE float kernel_ray_samples_begin_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
 {
     const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
     const vf t_end = vf_min(t_last, p->t_far);
@@ -169,7 +169,8 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int vol
 
 /* Computes the samples with the numbers first .. last of all volumes, for the given blocks. Returns false if no ray
  * receives light any more. */
-SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
+SIMD_INLINE bool kernel_tile_sample_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first,
+                                           int last)
 {
     const render_job *job = t->frame->job;
     bool is_lit = false;
@@ -179,7 +180,8 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
         for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
             const int i = b * KERNEL_BLOCK_PACKETS + n;
             kernel_samples_window(&t->packets[i], &v->packets[i], first, last - first + 1);
-            far = simd_max(kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
+            far = simd_max(
+                kernel_ray_samples_begin_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
         }
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
         is_lit = is_lit || far > -INFINITY;
@@ -238,7 +240,7 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     for (int from = first, to; from <= last; from = to) {
         const int samples = kernel_tile_window_samples(v, &t->packets[packets[0]], from);
         to = last - from < samples ? last + 1 : from + samples;
-        if (!kernel_tile_window(t, v, blocks, from, to - 1)) break;
+        if (!kernel_tile_sample_window(t, v, blocks, from, to - 1)) break;
         if (!t->frame->job->separate_samples) kernel_tile_window_blend(t, v, packets, count, to - from);
     }
     for (int n = 0; n < count; n++) {
