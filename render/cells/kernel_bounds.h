@@ -36,11 +36,11 @@ typedef struct kernel_bounds {
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     /* coefficients 4 to 7 (of the products of coordinates, kernel_map.h) of the map's nonlinear part N */
     float nonlinear_part[3][4][SIMD_WIDTH];
-    /* upper bounds that kernel_roots.h calls L (of how much the inverse map stretches distances) and G (of the field's
-     * gradient) */
+    /* stretch: upper bound of the factor by which the inverse map stretches distances (L of kernel_roots.h); slope:
+     * upper bound of the field's gradient (G of kernel_roots.h) */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
-    /* upper bounds that kernel_roots.h calls H and K, of the second derivatives of the field and the map; for a pyramid
-     * they are multiplied by its coordinate k */
+    /* Upper bounds of the second derivatives of the field (H of kernel_roots.h) and of the map's nonlinear part (K).
+     * For a pyramid they are bounds of these derivatives times its reference coordinate k. */
     float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
     /* Coefficients from which surface/kernel_contraction.h computes a ray's crossing of the isovalue if it is the only
      * one in the cell. J0^-1 (X - vertex 0) + offset equals r + N(r), where r is counted from the reference domain's

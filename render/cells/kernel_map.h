@@ -219,8 +219,8 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     }
 }
 
-/* Returns a field at the reference coordinates r in each ray's own cell. values and lane: as for
- * kernel_maps_polynomial(). */
+/* Returns a field at the reference coordinates r in each ray's own cell. values: the field by vertex, in arrays whose
+ * lanes are cells; lane: the lane of each ray's cell in these arrays. */
 SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);

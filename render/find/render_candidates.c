@@ -105,8 +105,8 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
                 }
 }
 
-/* Sorts the candidates that a thread has found by tile. Returns false if there are more than `most`, where each
- * candidate counts once for each of its tiles, or if memory runs out. */
+/* Sorts the candidates that one thread has found by tile; a candidate is stored once for each tile in which it may be
+ * visible. Returns false if more than `most` would be stored, or if memory runs out. */
 static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;

@@ -24,7 +24,8 @@ typedef struct kernel_tile_trace {
     kernel_planes tree_planes, tile_planes;
     unsigned traced_blocks; /* mask of the blocks that contain pixels to trace */
     unsigned begun;         /* mask of the blocks whose packets have been set up */
-    /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
+    /* index of the interval of each ray in which volumes are being traced; the clips of volumes leave these intervals
+     * (kernel_clip.h) */
     int clip_interval;
     float t_near; /* t at the eye's plane; while volumes are traced, least t of the current window */
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */

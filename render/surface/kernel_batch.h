@@ -189,8 +189,9 @@ static __attribute__((noinline)) unsigned kernel_batch_accept_plain(kernel_tile_
     return kernel_lane_hits_accept_opaque(t, b->queued, r, hit, depth, normal, NULL);
 }
 
-/* Accepts the hits of one vector of rays on a layer of any kind. is_whole: set if the rays are a whole packet; w:
- * values of the colour field at the hits. Returns the same as kernel_batch_accept_plain(). */
+/* Accepts the hits of one vector of rays on any layer. is_whole: set if the rays are a whole packet; w: values of the
+ * colour field at the hits. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
+ * one. */
 static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b,
                                                               const kernel_lane_rays *r, bool is_whole, vm hit,
                                                               vf depth, vf w)

@@ -63,8 +63,8 @@ SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *
     return nearest;
 }
 
-/* Finds those vertices of each ray's cell that lie in the surface, in the order of the cell's vertices, and at most
- * four. places: their positions in the ray's plane. Returns the number of each ray's vertices. */
+/* Lists the vertices of each ray's cell that lie in the surface, at most four, in the order of the cell's vertices.
+ * places: their positions in the ray's plane. Returns the number of listed vertices for each ray. */
 SIMD_INLINE vf kernel_edge_face_vertices(const kernel_packet *p, const kernel_surface_hits *h, vf places[4][2])
 {
     vf count = vf_set(0);

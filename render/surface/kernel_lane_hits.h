@@ -29,8 +29,9 @@ SIMD_INLINE bool kernel_tile_hits_are_plain(const kernel_tile_trace *t)
            t->frame->job->paint != RENDER_VALUES;
 }
 
-/* Computes the reach of hits in each of the cells, if the layer's normals come from differences. world: coordinates of
- * the cells' `count` vertices, by vertex and axis, in two halves of the lanes. */
+/* Computes own->reach if the layer's normals come from central differences: for each of the cells, the distance from a
+ * hit to the points at which the field is sampled. world: coordinates of the cells' `count` vertices, by vertex and
+ * axis, in two halves of the lanes. */
 SIMD_INLINE void kernel_surface_cells_set_reach(const kernel_tile_trace *t, kernel_surface_cells *own,
                                                 const kernel_f64 (*world)[3][2], int count)
 {

@@ -98,8 +98,8 @@ typedef struct kernel_secondary_ray {
     float origin[3], direction[3]; /* the direction has unit length */
     float far;
     bool is_open;
-    /* hit: index of the ray's hit in its chunk; number: index of the ray in the hemisphere or, for a ray to a light,
-     * RENDER_MAX_SAMPLES plus the light's index */
+    /* hit: index of the ray's hit among the hits that a thread traces together; number: index of the ray in the
+     * hemisphere or, for a ray to a light, RENDER_MAX_SAMPLES plus the light's index */
     int16_t hit, number;
 } kernel_secondary_ray;
 

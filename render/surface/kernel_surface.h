@@ -153,9 +153,9 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit
     if (vm_any(hit)) kernel_emit_transparent(p, s, hit, h);
 }
 
-/* Returns a field at the reference coordinates r in each ray's own cell, from its values by vertex and lane. lane: the
- * lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single function for all cell
- * types that is not inlined. */
+/* Returns a field at the reference coordinates r in each ray's own cell. values: the field by vertex and lane; lane:
+ * the lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single function for all
+ * cell types that is not inlined. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {

@@ -149,9 +149,9 @@ typedef struct kernel_double_points {
     vm sound;
 } kernel_double_points;
 
-/* Returns one of the affine functions of each ray's face on the ray (u, v), for one half of the lanes. function:
- * KERNEL_DOUBLE_DEPTH, KERNEL_DOUBLE_VALUE or KERNEL_DOUBLE_WEIGHT; index: of the face's first number in `faces`, in
- * floats. */
+/* Returns the value on the ray (u, v) of one of the affine functions of the face that each ray crosses, for one half of
+ * the lanes. function: KERNEL_DOUBLE_DEPTH, KERNEL_DOUBLE_VALUE or KERNEL_DOUBLE_WEIGHT; index: index, in floats, of
+ * the face's first number in `faces`. */
 SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_face *faces, int function, vi index, int half,
                                             kernel_f64 u, kernel_f64 v)
 {

@@ -233,9 +233,9 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_un
     s->is_last = vm_or(vm_andnot(s->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
-/* Returns the number that is at_low at the piece's low end, at_high at its high end and linear between, at the rays'
- * current values. inverse: 1 / the piece's width. It is interpolated from both ends: near an end with the number 0 the
- * result is as exact as the distance to that end. */
+/* Interpolates a number linearly between the two ends of each ray's piece, at the ray's current value. at_low, at_high:
+ * the number at the piece's ends; inverse: 1 / the piece's width. The result is computed from the distances to both
+ * ends, so that near an end at which the number is 0 it is as exact as the distance to that end. */
 SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *s, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);

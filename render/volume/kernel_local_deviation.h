@@ -130,7 +130,7 @@ typedef struct kernel_local_chord {
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
     vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
-    /* copies of the cell's numbers: coefficients of the map's nonlinear terms, and h (kernel_local_bounds.terms) */
+    /* copies for each ray's cell: the coefficients of the map's nonlinear terms, and h (kernel_local_bounds.terms) */
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
     vf tolerance, residual_limit;
     /* Used instead of the members above if the type is GRID_NO_TYPE: the packet, its cell, the cell's inverse map, and

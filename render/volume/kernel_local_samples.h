@@ -75,9 +75,10 @@ typedef struct kernel_tile_volume {
 
 /* ---- samples ---- */
 
-/* Finds the samples of the window that may lie between the depths `near` and `far` on each ray: those with the numbers
- * in the window from *number to *last; none if *last is less than *number. *number is limited to the window's end, so
- * that it does not overflow an int. base, step: depth of sample number 0, and distance between samples in depth. */
+/* Finds the samples of the window that may lie between the depths `near` and `far` on each ray. *number, *last: indices
+ * in the window of the first and the last of them; *last is less than *number if there are none. *number is limited to
+ * the window's end, so that it does not overflow an int. base, step: depth of sample number 0, and distance between
+ * samples in depth. */
 SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base, vf step, vf near, vf far, vf *number,
                                            vf *last)
 {
@@ -87,8 +88,8 @@ SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base,
     *last = vf_min(vf_floor(((far - base) * inverse - first) + v->pad), vf_set((float)(v->count - 1)));
 }
 
-/* Sets the values of the samples of the lanes in `own`, unless another cell has set them. places: position of each ray
- * among the tile's packets; numbers: the samples' numbers in the window. Returns the lanes whose samples already have
+/* Sets the values of samples, one per lane in `own`, unless another cell has set them. places: position of each ray
+ * among the tile's packets; numbers: the samples' indices in the window. Returns the lanes whose samples already have
  * the value of another cell. */
 SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, vi places, vi numbers, vf value)
 {

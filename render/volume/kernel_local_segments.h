@@ -120,8 +120,8 @@ static __attribute__((noinline)) void kernel_linear_segments(const kernel_tile_t
 
 /* ---- intervals of rays ---- */
 
-/* Adds one segment per lane, in the lanes `rays`, to the list of the lane's ray. places: position of each ray among the
- * tile's packets; v_in, v_out: values in the transfer function's domain. */
+/* Adds one segment per lane to the segments of the lane's ray. rays: the lanes that have a segment; places: position of
+ * each ray among the tile's packets; v_in, v_out: values in the transfer function's domain. */
 SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, vf t_in, vf t_out, vf v_in,
                                              vf v_out)
 {
@@ -362,13 +362,14 @@ static __attribute__((noinline)) void kernel_local_segments_cut(kernel_tile_trac
     KERNEL_OF_TYPE(type, kernel_local_segments_cut_of, t, b, whole, rays, reach);
 }
 
-/* Adds the words of the given lanes to a list of rays. */
+/* Appends rays to a list of rays. words: per lane, the word that describes a ray; rays: the lanes that are appended. */
 SIMD_INLINE void kernel_local_list_add(kernel_tile_segments *b, int list, vm rays, vi words)
 {
     b->list_count[list] += vf_compress(b->list[list] + b->list_count[list], rays, vf_from_bits(words));
 }
 
-/* Loads a vector of rays of a list, from index n on: their words and rays. Returns the lanes that contain a ray. */
+/* Loads up to SIMD_WIDTH rays from index n on of a list: the words that describe the rays, and the rays themselves.
+ * Returns the lanes that contain a ray. */
 SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, const kernel_tile *tile, int n,
                                       vi *words, kernel_lane_rays *rays)
 {
@@ -379,9 +380,9 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, c
     return all;
 }
 
-/* Finds the faces that rays cross, for the vector of rays from index n on of the list KERNEL_LOCAL_MET. Rays that
- * certainly cross exactly two faces once each are added to the lists of crossed faces. Rays for which that is uncertain
- * are processed cell by cell. */
+/* Finds the crossed faces of up to SIMD_WIDTH rays, from index n on of the list KERNEL_LOCAL_MET. Rays that certainly
+ * cross exactly two faces once each are added to the lists of rays with two crossed faces. Rays for which that is
+ * uncertain are processed cell by cell. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
@@ -401,7 +402,8 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     }
 }
 
-/* Adds the segments of the vector of rays from index n on of a list of crossed faces. */
+/* Adds the segments of up to SIMD_WIDTH rays, from index n on of a list of rays with two crossed faces
+ * (KERNEL_LOCAL_CROSSED or KERNEL_LOCAL_CROSSED_TRIANGLE). */
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b, int list, int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;

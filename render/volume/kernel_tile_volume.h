@@ -65,9 +65,9 @@ static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedr
 
 /* ---- tets: the results are bit-identical for listed pairs and packets ---- */
 
-/* Emits samples that also lie in another cell, or all samples if these are separate, as fragments of their own. lanes:
- * mask of the lanes that hold such a sample; places: position of each ray among the tile's packets; t_in, t_out: the
- * rays' intervals in their tets; depth, value: of the samples. */
+/* Emits samples as fragments of their own: those that also lie in another cell or, with separate_samples (render.h),
+ * all samples. lanes: mask of the lanes that hold such a sample; places: position of each ray among the tile's packets;
+ * t_in, t_out: the rays' intervals in their tets; depth, value: of the samples. */
 static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_tile_trace *t, unsigned lanes, vi places,
                                                                         vf t_in, vf t_out, vf depth, vf value)
 {

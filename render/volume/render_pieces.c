@@ -293,7 +293,8 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
  * channels with two b each. */
 enum { VARIATION_KINDS = 7 };
 
-/* Range of each kind of g over a range of values, and the maximum of the extinction. */
+/* Over a range of values: the minimum and maximum of each kind of g (VARIATION_KINDS), and the maximum of the
+ * extinction. */
 typedef struct value_variation {
     double low[VARIATION_KINDS], high[VARIATION_KINDS];
     double extinction;
