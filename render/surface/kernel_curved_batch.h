@@ -37,6 +37,7 @@
 #include "kernel_transformed_curved.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
+#include "kernel_single_cells.h"
 #include "kernel_surface.h"
 #include "kernel_surface_cells.h"
 #include "kernel_tile_trace.h"

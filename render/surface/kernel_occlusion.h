@@ -18,6 +18,7 @@
 #include "kernel_occluders.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
+#include "kernel_polyhedron_surface.h"
 #include "kernel_roots.h"
 #include "kernel_surface.h"
 #include "kernel_types.h"

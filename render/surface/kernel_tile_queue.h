@@ -9,7 +9,7 @@
 #include "kernel_batch.h"
 #include "kernel_cell.h"
 #include "kernel_curved_batch.h"
-#include "kernel_surface.h"
+#include "kernel_single_cells.h"
 #include "kernel_surface_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"

@@ -1,0 +1,35 @@
+/* Traces single cells by the packets of the blocks that they may meet: cells and rays that cannot be traced in lanes. */
+#ifndef RENDER_KERNEL_SINGLE_CELLS_H
+#define RENDER_KERNEL_SINGLE_CELLS_H
+
+#include "kernel_cell.h"
+#include "kernel_packet.h"
+#include "kernel_polyhedron_surface.h"
+#include "kernel_surface.h"
+#include "kernel_tile_trace.h"
+
+/* Traces a cell with the rays of each of the given blocks (squares of 4 × 4 pixels). cell, curved: a hex, wedge or
+ * pyramid in tile space, of which the surface of the isovalue with index `value` is traced; NULL for the polyhedron
+ * with this part and index, in which all isovalues of the layer are traced. */
+static __attribute__((noinline)) void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part,
+                                                          uint32_t index, const kernel_cell *cell,
+                                                          const kernel_curved *curved, int value)
+{
+    for (; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        bool is_nearer = false;
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            kernel_packet *p = &t->packets[block * KERNEL_BLOCK_PACKETS + n];
+            p->is_nearer = false;
+            if (cell)
+                kernel_curved_surface(p, t->surface, cell, curved, value, p->active);
+            else
+                kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
+            is_nearer = is_nearer || p->is_nearer;
+        }
+        if (is_nearer) kernel_block_update_far(t, block);
+    }
+}
+
+#endif
