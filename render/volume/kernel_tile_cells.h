@@ -263,8 +263,8 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     return meets;
 }
 
-/* Makes the cell in the given lane of the current vector the tile's current cell (`cell`), to be processed by packets,
- * for rays of any block. Does nothing if it already is the current cell. Returns false if it is invisible. */
+/* Reads and transforms the cell in the given lane of the current vector into cells->cell, from where packets of any
+ * block process it. Does nothing if it is already there. Returns false if the cell is invisible. */
 static __attribute__((noinline, cold)) bool kernel_tile_set_current_cell(kernel_tile_trace *t, int lane)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;

@@ -285,7 +285,7 @@ bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool
     const int type = is_pyramid ? GRID_HEX : of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
     *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3,
                            .lattice = session_complete_nodes(type, of->order)};
-    bool is_made = session_make_completion(of, order, &out->nodes) && make_levels(out);
+    bool is_made = session_make_node_positions(of, order, &out->nodes) && make_levels(out);
     if (is_pyramid && is_made) out->collapse = session_compute_collapse_matrix(of->order);
     is_made = is_made && (out->collapse || !is_pyramid);
     is_lobatto = is_lobatto && !is_pyramid;
@@ -668,7 +668,8 @@ static difference_means find_means(int dimensions, const double *second)
     return out;
 }
 
-/* Returns the means of u and its square over a cell for one factor of the reference cell (top of the file).
+/* Returns the means of u and its square over a cell, where u is the difference between the polynomial and its linear
+ * interpolation along one factor: one of the simplices whose product the reference cell is (top of the file).
  * coefficients: Bernstein coefficients of a scalar. inner: distance in the array between neighbouring coefficients of
  * the factor. */
 static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,

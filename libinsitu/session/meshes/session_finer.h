@@ -62,8 +62,8 @@ int session_find_max_edge_parts(const session_finer_choice *choice);
 insitu_status session_count_higher_order_cells(session_meshes *meshes, const session_catalogue *catalogue,
                                                MPI_Comm comm, session_finer_choice *choices, base_error *error);
 
-/* Allocates marks for each part of the mesh; no cell is marked yet. Without marks all cells are refined. Returns false
- * if memory runs out. Local. */
+/* Allocates the arrays of marks for all parts of the mesh, without a marked cell. Only marked cells are refined; in a
+ * mesh for which this function has not been called, all cells are. Returns false if memory runs out. Local. */
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
 
 /* Returns the marks of the part of the mesh with this index; NULL: all of the part's cells are refined. */

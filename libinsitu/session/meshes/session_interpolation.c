@@ -107,7 +107,7 @@ static void fill_pyramid_basis(int p, const double at[3], double *out)
 
 /* Fills a matrix with the pyramid's basis functions at all nodes of a hex of order p whose upper face is collapsed to
  * the apex: one row per node, one column per function. */
-static void fill_collapsed_rows(int p, double *out)
+static void fill_collapsed_hex_basis(int p, double *out)
 {
     const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
     for (int k = 0; k <= p; k++)
@@ -164,7 +164,7 @@ double *session_compute_collapse_matrix(int p)
     const int columns = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
     double *out = base_alloc((size_t)rows * (size_t)columns * sizeof *out);
     if (!out) return NULL;
-    fill_collapsed_rows(p, out);
+    fill_collapsed_hex_basis(p, out);
     if (convert_rows(p, rows, out)) return out;
     base_free(out);
     return NULL;
@@ -304,7 +304,7 @@ static bool list_own_nodes(session_interpolation *out, int parts)
     return out->own;
 }
 
-bool session_make_completion(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
+bool session_make_node_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     *out = (session_interpolation){.of = *of, .complete = session_complete_nodes(of->type, of->order)};
     out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
@@ -315,7 +315,7 @@ bool session_make_completion(const session_nodes *of, insitu_vertex_order order,
 bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
                                 session_interpolation *out)
 {
-    if (!session_make_completion(of, order, out)) return false;
+    if (!session_make_node_positions(of, order, out)) return false;
     out->fine = session_complete_nodes(of->type, parts * of->order);
     return make_weights(of, parts, is_lobatto, out) && list_all_sides(out) && list_own_nodes(out, parts);
 }

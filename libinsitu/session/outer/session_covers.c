@@ -238,8 +238,8 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     out->cut_axis = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
-        /* Ends of the fine box, in a unit in which all lengths are integers: a cell of the coarsest level has the
-         * length of * by, a cell of the coarse box the length `of`, and a cell of the fine box the length `by`. */
+        /* Ends of the fine box, in a unit in which all lengths are integers: a cell of the coarse box has the length
+         * `of`, a cell of the fine box the length `by`, and a cell of the coarsest level their product. */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
         const int64_t first = coarse->lower[axis], last = coarse->upper[axis];
         const int64_t lower = floor_quotient(begin, of), upper = -floor_quotient(-end, of);

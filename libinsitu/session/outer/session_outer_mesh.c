@@ -133,8 +133,8 @@ typedef struct outer_work {
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
     int64_t loop_end;     /* number of entries of out->loops that have been stored */
-    /* Set if cells of higher order are split into pieces. The loop of a piece's face, by which edges are drawn, is then
-     * the rim of the caller's face that contains the piece's face (session_rims.h). */
+    /* Set if cells of higher order are split into pieces. Edges are then drawn along the rims of the caller's faces
+     * (session_rims.h), not around the faces of pieces. */
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */

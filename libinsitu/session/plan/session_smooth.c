@@ -143,7 +143,8 @@ static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum
     return count;
 }
 
-/* Adds the keys of the marked vertices to the sums. */
+/* Creates the set of keys of this rank's vertices, sums->keys, from the vertices that have been marked (key_indices 0).
+ * A key identifies a vertex on all ranks. most: upper bound of the number of keys. */
 static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_sums *sums)
 {
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;

@@ -650,8 +650,8 @@ static bool is_valid_scene_name(const yaml_node_t *name)
 }
 
 /* Checks a mapping whose keys are names that the scene defines. */
-static insitu_status check_named(scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status check_mapping_of_names(scene_document *d, const char *path, const yaml_node_t *node,
+                                            const cyaml_schema_value_t *value, const scene_key *key)
 {
     if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
     const yaml_node_pair_t *first = node->data.mapping.pairs.start, *end = node->data.mapping.pairs.top;
@@ -783,7 +783,9 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);
     case CYAML_IGNORE:
-        return (key->named ? check_named : key->forms ? check_forms : check_names)(d, path, node, value, key);
+        return (key->named   ? check_mapping_of_names
+                : key->forms ? check_forms
+                             : check_names)(d, path, node, value, key);
     default:
         return is_valid_scalar(node, value, key) ? store_scalar(d, node, value, to)
                                                  : fail_for_value(d, path, node, value, key);

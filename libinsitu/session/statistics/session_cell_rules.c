@@ -208,7 +208,7 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                                               : type == GRID_QUAD || type == GRID_WEDGE ? 1
                                                                                         : 0};
     if (is_pyramid) out->collapse = session_compute_collapse_matrix(of->order);
-    return session_make_completion(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
+    return session_make_node_positions(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
            (!has_straight || weigh_corners(has_spacing, out)) &&
            make_rule(&nodes, out->line_count, has_spacing, true, &out->bent) &&
            (!has_straight || make_rule(&nodes, out->line_count, has_spacing, false, &out->straight));
@@ -345,7 +345,8 @@ static void sum_line(const session_rule_factor *line, const double *functions, s
         for (size_t i = 0; i < size; i++) out[i] += functions[n * line->width] * in[(size_t)n * size + i];
 }
 
-/* Evaluates lattices[lines] at one point of the rule of its last line, and stores the result in lattices[lines - 1]. */
+/* Evaluates a lattice of nodes at one quadrature point of its last axis, so that the result has one axis less. The
+ * lattice lattices[lines] has `lines` such axes; the result is stored in lattices[lines - 1]. */
 static void evaluate_lattice_on_line(const cell_visit *v, int lines, int point)
 {
     const session_rule_factor *line = &v->rule->line;

@@ -322,7 +322,7 @@ static bool begin_pass(order_pass *p)
         const session_nodes *nodes = &p->rows.kinds[i].nodes;
         const insitu_vertex_order order = session_nodal_mesh(mesh)->vertex_order;
         if (is_summed(nodes)) continue;
-        is_made = nodes->order == 1 ? session_make_completion(nodes, order, &p->rules[i].nodes)
+        is_made = nodes->order == 1 ? session_make_node_positions(nodes, order, &p->rules[i].nodes)
                                     : session_make_cell_rules(nodes, order, p->of->is_lobatto, &p->rules[i]);
     }
     return is_made;
