@@ -3,6 +3,7 @@
 #define RENDER_KERNEL_COLOUR_H
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "fragment.h"
@@ -182,7 +183,8 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
         p->thread->out_of_memory = true;
         return;
     }
-    _Static_assert(sizeof(fragment) == 8 * sizeof(float), "a fragment has the eight members below");
+    _Static_assert(offsetof(fragment, colour) == 12 && offsetof(fragment, kind) == 28 && sizeof(fragment) == 32,
+                   "a fragment has the members of `first`, then those of `second`");
     const vi kinds = vi_from_vf(f->kind) + (int32_t)kind;
     vf first[4] = {vf_load((const float *)(const void *)p->pixel), f->t_in, f->t_out, f->colour[0]};
     vf second[4] = {f->colour[1], f->colour[2], f->transmittance, vf_from_bits(kinds)};

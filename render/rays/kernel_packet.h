@@ -100,8 +100,8 @@ static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
     p->slope_y = kernel_gather_tile_numbers(tile->slope_y, tile_row);
 }
 
-/* Sets the indices of the packet's pixels in the image, and deactivates rays whose pixels lie outside the image or are
- * not traced. */
+/* Sets the indices of the packet's pixels in the image from their columns and rows, and makes those rays active whose
+ * pixels lie in the image and are traced. */
 static inline void kernel_packet_pixels(kernel_packet *p, int x0, int y0)
 {
     typedef uint32_t kernel_lane_pixels __attribute__((vector_size(SIMD_WIDTH * 4)));

@@ -8,6 +8,7 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_accept.h"
 #include "kernel_bounds.h"
 #include "kernel_bundle.h"
 #include "kernel_cell.h"
@@ -20,7 +21,6 @@
 #include "kernel_polyhedron.h"
 #include "kernel_polyhedron_surface.h"
 #include "kernel_roots.h"
-#include "kernel_surface.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_polyhedra.h"
@@ -113,7 +113,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 }
 
 /* Makes the rays inactive that are blocked in the current interval of r, by following the profile of the field along
- * them (kernel_surface.h). */
+ * them (kernel_polyhedron_surface.h). */
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;

@@ -1,4 +1,5 @@
-/* Traces single cells by the packets of the blocks that they may meet: cells and rays that cannot be traced in lanes. */
+/* Traces single cells that cannot be traced in lanes, by the packets of the blocks that they may meet: polyhedra, and
+ * hexes, wedges and pyramids with an edge of length zero. */
 #ifndef RENDER_KERNEL_SINGLE_CELLS_H
 #define RENDER_KERNEL_SINGLE_CELLS_H
 

@@ -27,7 +27,6 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_roots.h"
-#include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
