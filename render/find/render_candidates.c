@@ -160,7 +160,7 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
     kernel_tile_candidate *to = bin->items;
     for (const struct kernel_bins *b = bins; is_shared && b; b = b->next) {
         const int own = count_candidates_in_tile(b, tile);
-        memcpy(to, b->items + b->starts[tile], (size_t)own * sizeof *to);
+        if (own) memcpy(to, b->items + b->starts[tile], (size_t)own * sizeof *to);
         to += own;
     }
     return true;
