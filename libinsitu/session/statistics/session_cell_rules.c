@@ -137,9 +137,9 @@ static void fill_block(const session_rule_factor *factor, int first, double *out
 
 static bool make_factor(int dimensions, int order, bool is_lobatto, int points, session_rule_factor *out)
 {
-    static const int types[] = {GRID_NO_TYPE, GRID_NO_TYPE, GRID_TRIANGLE, GRID_TET};
+    const int simplex = dimensions == 2 ? GRID_TRIANGLE : GRID_TET;
     out->order = order;
-    out->node_count = dimensions > 1 ? session_complete_nodes(types[dimensions], order).count : order + 1;
+    out->node_count = dimensions > 1 ? session_complete_nodes(simplex, order).count : order + 1;
     out->is_lobatto = is_lobatto;
     if (!session_make_quadrature(dimensions, points, &out->rule)) return false;
     const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
