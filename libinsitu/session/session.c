@@ -171,11 +171,11 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
     return store_error(session, &error);
 }
 
-insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t block, const insitu_mesh *mesh)
+insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t number, const insitu_mesh *block)
 {
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
-    session_set_mesh(&session->meshes, mesh_name, block, mesh, &error);
+    session_set_mesh(&session->meshes, mesh_name, number, block, &error);
     return store_error(session, &error);
 }
 
