@@ -121,13 +121,11 @@ static __attribute__((noinline)) vm kernel_pairs_are_monotone(const kernel_curve
 SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vm *undecided)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach), far = vf_load(pairs->far);
-    kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
+    kernel_lane_rays p = {
+        .lane = vi_lanes(), .active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
     vm two;
     vi face[2];
     kernel_point ends[2];
-    int32_t lanes[SIMD_WIDTH];
-    for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
-    p.lane = kernel_load_ints(lanes);
     kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &two, undecided, face);
     if (!vm_any(two)) return vm_none();
     p.active = two;

@@ -23,11 +23,11 @@
 /* ---- cells ---- */
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
- * the blocks that are `apart` (4 or 8) vectors and lanes away from each other. number: the index of each lane, 0 to
- * 15. */
-SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
+ * the blocks that are `apart` (4 or 8) vectors and lanes away from each other. */
+SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], int apart)
 {
-    const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
+    const vi number = vi_lanes(), odd = -(number / apart & 1);
+    const vi low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
     for (int i = 0; i < KERNEL_LOCAL_ROW / 2; i++) {
         const int n = i / apart * 2 * apart + i % apart;
         const vf one = v[n], other = v[n + apart];
@@ -42,17 +42,14 @@ SIMD_INLINE void kernel_local_store_row(const float (*first)[SIMD_WIDTH], int fi
                                         const float (*second)[SIMD_WIDTH], int second_count, int row,
                                         kernel_transformed_curved *out)
 {
-    static const int32_t numbers[KERNEL_LOCAL_ROW] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     vf v[KERNEL_LOCAL_ROW];
-    vi number;
-    memcpy(&number, numbers, sizeof number);
     for (int i = 0; i < KERNEL_LOCAL_ROW / 2; i++) {
         v[i] = i < first_count ? vf_load(first[i]) : vf_set(0);
         v[i + KERNEL_LOCAL_ROW / 2] = i < second_count ? vf_load(second[i]) : vf_set(0);
     }
     for (int i = 0; i < KERNEL_LOCAL_ROW; i += 4) vf_transpose(v + i);
-    kernel_local_transpose(v, number, 4);
-    kernel_local_transpose(v, number, 8);
+    kernel_local_transpose(v, 4);
+    kernel_local_transpose(v, 8);
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
