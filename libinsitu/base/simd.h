@@ -321,12 +321,13 @@ SIMD_INLINE vf vf_floor(vf a)
 
 #if !defined(SIMD_AVX2)
 /* Returns base[index] per lane. The elements are copied by memcpy(), because some callers gather arrays of integers,
- * and interpret the bits of the result as integers again. */
+ * and interpret the bits of the result as integers again. The vector is not loaded from the array v: compilers would
+ * store v by parts of another size, and the load would wait until these stores have reached the cache. */
 SIMD_INLINE vf vf_gather(const float *base, vi index)
 {
-    float v[SIMD_WIDTH];
-    for (int i = 0; i < SIMD_WIDTH; i++) memcpy(v + i, base + index[i], sizeof *v);
-    return vf_load(v);
+    float v[4];
+    for (int i = 0; i < 4; i++) memcpy(v + i, base + index[i], sizeof *v);
+    return (vf){v[0], v[1], v[2], v[3]};
 }
 #endif
 
@@ -479,11 +480,9 @@ SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
     const __m128i own = half ? _mm256_extracti128_si256(i, 1) : _mm256_castsi256_si128(i);
     return (vd)_mm256_i32gather_pd((const double *)(const void *)base, own, 4);
 #else
-    double v[SIMD_WIDTH / 2];
-    vd out;
-    for (int i = 0; i < SIMD_WIDTH / 2; i++) memcpy(v + i, base + index[half * SIMD_WIDTH / 2 + i], sizeof *v);
-    memcpy(&out, v, sizeof v);
-    return out;
+    double v[2];
+    for (int i = 0; i < 2; i++) memcpy(v + i, base + index[2 * half + i], sizeof *v);
+    return (vd){v[0], v[1]};
 #endif
 }
 
@@ -538,6 +537,24 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 
 #endif
 
+#if defined(SIMD_AVX2) || defined(SIMD_SSE42)
+/* vf_compress() for four lanes. bits: mask of the lanes that are stored. */
+SIMD_INLINE int simd_compress_four(float *to, unsigned bits, __m128 v)
+{
+#define LANE(n) 4 * n, 4 * n + 1, 4 * n + 2, 4 * n + 3
+#define LANES(a, b, c, d) {LANE(a), LANE(b), LANE(c), LANE(d)}
+    static const uint8_t bytes[16][16] = {LANES(0, 0, 0, 0), LANES(0, 0, 0, 0), LANES(1, 0, 0, 0), LANES(0, 1, 0, 0),
+                                          LANES(2, 0, 0, 0), LANES(0, 2, 0, 0), LANES(1, 2, 0, 0), LANES(0, 1, 2, 0),
+                                          LANES(3, 0, 0, 0), LANES(0, 3, 0, 0), LANES(1, 3, 0, 0), LANES(0, 1, 3, 0),
+                                          LANES(2, 3, 0, 0), LANES(0, 2, 3, 0), LANES(1, 2, 3, 0), LANES(0, 1, 2, 3)};
+#undef LANES
+#undef LANE
+    const __m128i order = _mm_loadu_si128((const __m128i *)(const void *)bytes[bits]);
+    _mm_storeu_ps(to, _mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(v), order)));
+    return __builtin_popcount(bits);
+}
+#endif
+
 /* Stores the lanes of v that are set in m one after the other, and returns their number. `to` must have space for all
  * lanes. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
@@ -545,6 +562,12 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #if defined(SIMD_AVX512)
     _mm512_storeu_ps(to, _mm512_maskz_compress_ps((__mmask16)m, (__m512)v));
     return __builtin_popcount(vm_bits(m));
+#elif defined(SIMD_AVX2)
+    const unsigned bits = vm_bits(m);
+    const int count = simd_compress_four(to, bits & 15, _mm256_castps256_ps128((__m256)v));
+    return count + simd_compress_four(to + count, bits >> 4, _mm256_extractf128_ps((__m256)v, 1));
+#elif defined(SIMD_SSE42)
+    return simd_compress_four(to, vm_bits(m), (__m128)v);
 #else
     int count = 0;
     for (unsigned bits = vm_bits(m); bits; bits &= bits - 1) to[count++] = v[__builtin_ctz(bits)];
