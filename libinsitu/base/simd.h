@@ -541,14 +541,11 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 /* vf_compress() for four lanes. bits: mask of the lanes that are stored. */
 SIMD_INLINE int simd_compress_four(float *to, unsigned bits, __m128 v)
 {
-#define LANE(n) 4 * n, 4 * n + 1, 4 * n + 2, 4 * n + 3
-#define LANES(a, b, c, d) {LANE(a), LANE(b), LANE(c), LANE(d)}
-    static const uint8_t bytes[16][16] = {LANES(0, 0, 0, 0), LANES(0, 0, 0, 0), LANES(1, 0, 0, 0), LANES(0, 1, 0, 0),
-                                          LANES(2, 0, 0, 0), LANES(0, 2, 0, 0), LANES(1, 2, 0, 0), LANES(0, 1, 2, 0),
-                                          LANES(3, 0, 0, 0), LANES(0, 3, 0, 0), LANES(1, 3, 0, 0), LANES(0, 1, 3, 0),
-                                          LANES(2, 3, 0, 0), LANES(0, 2, 3, 0), LANES(1, 2, 3, 0), LANES(0, 1, 2, 3)};
-#undef LANES
-#undef LANE
+    /* the bytes of the lanes in the order in which they are stored, for each mask */
+    enum { A = 0x03020100, B = 0x07060504, C = 0x0b0a0908, D = 0x0f0e0d0c };
+    static const int32_t bytes[16][4] = {
+        {A, A, A, A}, {A, A, A, A}, {B, A, A, A}, {A, B, A, A}, {C, A, A, A}, {A, C, A, A}, {B, C, A, A}, {A, B, C, A},
+        {D, A, A, A}, {A, D, A, A}, {B, D, A, A}, {A, B, D, A}, {C, D, A, A}, {A, C, D, A}, {B, C, D, A}, {A, B, C, D}};
     const __m128i order = _mm_loadu_si128((const __m128i *)(const void *)bytes[bits]);
     _mm_storeu_ps(to, _mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(v), order)));
     return __builtin_popcount(bits);
