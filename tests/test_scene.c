@@ -45,6 +45,11 @@ static void parse_valid_scene(const char *text, scene *s)
     if (parse_scene(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
 }
 
+/* 64 brackets, the largest number that may be nested */
+#define EIGHT(text) text text text text text text text text
+#define BEGIN_64 EIGHT(EIGHT("("))
+#define END_64 EIGHT(EIGHT(")"))
+
 static const char every_key[] =
     "threads: 3\n"
     "tree: partial\n"
@@ -177,6 +182,7 @@ static const char every_key[] =
     "  l: {lambda2: u}\n"
     "  s: {strain_rate: u}\n"
     "  slice: {field: u, component: x}\n"
+    "  nested: " BEGIN_64 "p" END_64 "\n"
     "meshes:\n"
     "  plate: {warp: {field: DISPL, scale: -2.5}}\n"
     "  plate/a.b: {warp: w}\n"
@@ -1470,7 +1476,7 @@ static void derived_fields_are_sorted_and_read(void **state)
     scene s;
     int late, speed, last, late_w, at;
     parse_valid_scene(every_key, &s);
-    assert_int_equal(s.derived_count, 11);
+    assert_int_equal(s.derived_count, 12);
     const scene_derived *of = find_derived(&s, "late", &late);
     find_derived(&s, "speed", &speed);
     const scene_derived *curl = find_derived(&s, "last", &last);

@@ -39,6 +39,8 @@ typedef struct mistake {
     const char *words[3];
 } mistake;
 
+#define EIGHT(text) text text text text text text text text
+
 static const mistake mistakes[] = {
     {3,
      1,
@@ -943,6 +945,16 @@ static const mistake mistakes[] = {
      {"fields.a", "the number 1e999 is too large", "expected one below 1.8e308"}},
     {1, 1, "fields:\n  a: 1 + 2\nimages:", 2, {"fields.a", "\"1 + 2\" names no field", "expected one at least"}},
     {1, 1, "fields:\n  a: 2 * \"wall heat\nimages:", 2, {"fields.a", "has no end", "expected \" behind it"}},
+    {1,
+     1,
+     "fields:\n  a: " EIGHT(EIGHT("(")) "sqrt(p)" EIGHT(EIGHT(")")) "\nimages:",
+     2,
+     {"fields.a", "more than 64 brackets and functions are nested", "expected fewer"}},
+    {1,
+     1,
+     "fields:\n  a: " EIGHT(EIGHT("p ^ ")) "p\nimages:",
+     2,
+     {"fields.a", "more than 32 intermediate values are open at once", "expected fewer brackets or exponents"}},
     {1, 1, "fields:\n  a: mag(u.x)\nimages:", 2, {"fields.a", "\".\" stands behind", "mag takes a field alone"}},
     {1,
      1,

@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    /* number of calls of parse_sign() that have not returned, at most MOST_NESTED. Each bracket, function and exponent
-     * that is being parsed adds one. */
+    /* number of calls of parse_sign() that have not returned: one for the whole expression, and one for each bracket,
+     * function and exponent that is being parsed, of which there are at most MOST_NESTED */
     int nesting_depth;
     int stack_count; /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;
@@ -128,7 +128,8 @@ static bool add_instruction(parser *p, scene_operation operation, int input, dou
 static bool push_operand(parser *p, scene_operation operation, int input, double number)
 {
     if (++p->stack_count > SCENE_STACK)
-        return fail(p, "more than %d intermediate values are open at once, expected fewer brackets", SCENE_STACK);
+        return fail(p, "more than %d intermediate values are open at once, expected fewer brackets or exponents",
+                    SCENE_STACK);
     if (p->stack_count > p->expression->depth) p->expression->depth = p->stack_count;
     return add_instruction(p, operation, input, number);
 }
@@ -320,7 +321,8 @@ static bool parse_sign(parser *p)
 {
     bool is_negative = false;
     for (; peek_character(p) == '-' || *p->cursor == '+'; p->cursor++) is_negative = is_negative != (*p->cursor == '-');
-    if (++p->nesting_depth > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
+    if (p->nesting_depth++ > MOST_NESTED)
+        return fail(p, "more than %d brackets and functions are nested, expected fewer", MOST_NESTED);
     if (!parse_power(p)) return false;
     p->nesting_depth--;
     return !is_negative || add_instruction(p, SCENE_OP_NEGATE, 0, 0);
