@@ -248,17 +248,18 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
     int count = 0;
     for (int i = 1; i < 4; i += step, count++) {
         u[count] = vf_set(p->u + 0.25f * (float)i * p->width);
-        memcpy(at[count].r, p->r[i], sizeof p->r[i]);
+        if (type != GRID_NO_TYPE) memcpy(at[count].r, p->r[i], sizeof p->r[i]);
     }
     if (type == GRID_NO_TYPE) {
         kernel_local_map_deviations(c, ends, u, count, rays, off);
-    } else {
-        p->is_known = vm_and(p->is_known, kernel_local_newton(c, u, count, rays, type, at, &residual));
-        p->residual = vf_max(residual, p->residual);
+        for (int i = 1, n = 0; i < 4; i += step, n++) p->off[i] = off[n];
+        return;
     }
+    p->is_known = vm_and(p->is_known, kernel_local_newton(c, u, count, rays, type, at, &residual));
+    p->residual = vf_max(residual, p->residual);
     for (int i = 1, n = 0; i < 4; i += step, n++) {
         memcpy(p->r[i], at[n].r, sizeof p->r[i]);
-        p->off[i] = type == GRID_NO_TYPE ? off[n] : at[n].value;
+        p->off[i] = at[n].value;
     }
 }
 
@@ -266,7 +267,10 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
 SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kernel_point ends[2], vm rays, int type,
                                         kernel_local_places *out)
 {
-    *out = (kernel_local_places){.u = -0.5f, .width = 1, .is_known = vm_all_lanes()};
+    out->u = -0.5f;
+    out->width = 1;
+    out->off[0] = out->off[4] = out->residual = vf_set(0);
+    out->is_known = vm_all_lanes();
     if (type != GRID_NO_TYPE) {
         kernel_point middle;
         vf residual[3];
@@ -293,14 +297,16 @@ SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const ke
                                            const kernel_local_places *p, int half, vm rays, int type,
                                            kernel_local_places *out)
 {
-    *out = (kernel_local_places){.width = 0.5f * p->width, .residual = p->residual, .is_known = p->is_known};
+    out->width = 0.5f * p->width;
     out->u = p->u + (float)half * out->width;
-    for (int i = 0; i < 3; i++) {
-        out->off[2 * i] = p->off[2 * half + i];
-        memcpy(out->r[2 * i], p->r[2 * half + i], sizeof p->r[0]);
+    out->residual = p->residual;
+    out->is_known = p->is_known;
+    for (int i = 0; i < 3; i++) out->off[2 * i] = p->off[2 * half + i];
+    if (type != GRID_NO_TYPE) {
+        for (int i = 0; i < 3; i++) memcpy(out->r[2 * i], p->r[2 * half + i], sizeof p->r[0]);
+        for (int i = 1; i < 4; i += 2)
+            for (int a = 0; a < 3; a++) out->r[i][a] = 0.5f * (out->r[i - 1][a] + out->r[i + 1][a]);
     }
-    for (int i = 1; i < 4; i += 2)
-        for (int a = 0; a < 3; a++) out->r[i][a] = 0.5f * (out->r[i - 1][a] + out->r[i + 1][a]);
     kernel_local_evaluate(c, ends, 2, rays, type, out);
 }
 
