@@ -137,7 +137,7 @@ static void compare_with_single_cells(render_fixture *f)
     drawn_frame batches, alone;
     fixture_draw(f, &batches);
     draw_single_cells(f, &alone);
-    assert_true(batches.list.count > 100);
+    assert_true(batches.list.count > 50); /* the picture is not empty; a clip leaves 68 fragments of one of them */
     drawn_frame_assert_same(&batches, &alone);
     drawn_frame_free(&alone);
     drawn_frame_free(&batches);
