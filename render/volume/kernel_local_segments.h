@@ -210,9 +210,9 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
         kernel_local_restrict_to_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
-        /* if packets process a cell, the whole interval is always halved, because there is no bound of the deviation
-         * that does not show at its three inner places */
-        const vm good = type == GRID_NO_TYPE && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
+        /* in a cell that is not one of the current vector, the whole interval is always halved, because there is no
+         * bound of the deviation that does not show at its three inner places */
+        const vm good = bounds != &b->bounds && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
         kernel_local_emit(b, &part, good);
         if (!vm_any(rest)) continue;
@@ -266,9 +266,10 @@ static __attribute__((noinline)) void kernel_constant_segments(const kernel_tile
 }
 
 /* Adds the segments of a packet's rays in the tile's current cell (kernel_tile_cells.cell), between the depths reach[0]
- * and reach[1]. share: length between these depths, as a share of the rays' intervals in the cell. */
+ * and reach[1]. share: length between these depths, as a share of the rays' intervals in the cell; lane: the lane of
+ * the cell in the current vector, whose error bounds are then used; -1: the cell is not in it. */
 static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, vm rays,
-                                                             const vf reach[2], float share)
+                                                             const vf reach[2], float share, int lane)
 {
     const kernel_cell *c = &t->thread->tile_cells->cell;
     const kernel_map *map = t->thread->tile_cells->cell_map;
@@ -276,12 +277,15 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
     kernel_packet *p = &t->packets[packet];
     kernel_segments *list = &b->packets[packet];
     kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
-    kernel_local_bounds bounds;
+    kernel_local_bounds own_bounds;
+    const kernel_local_bounds *bounds = lane < 0 ? &own_bounds : &b->bounds;
     kernel_local_chord chord = {.packet = p, .map = map, .cell = c};
-    kernel_local_pairs whole = {
-        .begin = list->t_begin, .per_t = list->per_t, .share = share, .rays.at = kernel_packet_places(packet)};
+    kernel_local_pairs whole = {.begin = list->t_begin,
+                                .per_t = list->per_t,
+                                .share = share,
+                                .rays = {.at = kernel_packet_places(packet), .lane = vi_set(lane < 0 ? 0 : lane)}};
     const int count = kernel_curved_intervals(p, c, rays, intervals);
-    if (count && map) kernel_local_bound_of_cell(t->frame, b->volume, c, &bounds);
+    if (count && map && lane < 0) kernel_local_bound_of_cell(t->frame, b->volume, c, &own_bounds);
     for (int k = 0; k < count; k++) {
         const vf end = vf_min(intervals[k].t_out, reach[1]);
         vf from = vf_max(intervals[k].t_in, reach[0]);
@@ -298,7 +302,7 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
             whole.ends[1].t = from = to;
             for (int n = 0; n < 2; n++)
                 whole.ends[n].value = kernel_value_at(p, map, &intervals[k], mine, whole.ends[n].t);
-            if (vm_any(mine)) kernel_local_divide_intervals(t, &bounds, &chord, &whole, mine, GRID_NO_TYPE);
+            if (vm_any(mine)) kernel_local_divide_intervals(t, bounds, &chord, &whole, mine, GRID_NO_TYPE);
         }
     }
 }
@@ -329,7 +333,8 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
             wanted &= ~(1u << i);
         }
         if (!kernel_tile_set_current_cell(t, lane[first])) continue;
-        kernel_curved_segments(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
+        kernel_curved_segments(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own, share,
+                               lane[first]);
     }
 }
 

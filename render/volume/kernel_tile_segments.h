@@ -70,7 +70,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int packet, const po
     if (c)
         kernel_polyhedron_segments(t, packet, c, reach);
     else
-        kernel_curved_segments(t, packet, p->active, reach, 1);
+        kernel_curved_segments(t, packet, p->active, reach, 1, -1);
 }
 
 /* ---- tets ---- */
