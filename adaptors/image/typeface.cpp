@@ -5,15 +5,19 @@
 #include <ft2build.h>
 #include FT_FREETYPE_H
 #include FT_GLYPH_H
+#include FT_MODULE_H
 #include FT_STROKER_H
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <glob.h>
+#include <dirent.h>
 #include <memory>
 #include <new>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace
 {
@@ -30,17 +34,38 @@ bool succeeded(FT_Error code)
 
 /* ---- finding a font --------------------------------------------------------------------------------------------- */
 
-/* Returns the files of this font in the folder and up to three levels below. Uses glob(), because the directory
- * iterators of the C++ library terminate the process if memory runs out. */
-std::vector<std::string> find_files(const std::string &folder, const std::string &font)
+/* Returns the folders in this one, sorted by name, without hidden ones. It calls the C library, because the directory
+ * iterators of the C++ library end the process if memory runs out, and so does glob(). */
+std::vector<std::string> find_folders(const std::string &folder)
 {
     std::vector<std::string> out;
-    const std::string pattern = folder + "/{,*/,*/*/,*/*/*/}" + font + ".{ttf,otf,ttc,pfb}";
-    glob_t found{};
-    const int result = glob(pattern.c_str(), GLOB_BRACE, nullptr, &found);
-    const std::unique_ptr<glob_t, void (*)(glob_t *)> guard(&found, globfree);
-    if (result == GLOB_NOSPACE) throw std::bad_alloc();
-    for (std::size_t i = 0; result == 0 && i < found.gl_pathc; i++) out.emplace_back(found.gl_pathv[i]);
+    errno = 0;
+    const std::unique_ptr<DIR, int (*)(DIR *)> entries(opendir(folder.c_str()), closedir);
+    if (!entries && errno == ENOMEM) throw std::bad_alloc();
+    for (const dirent *entry; entries && (entry = readdir(entries.get()));) {
+        const std::string path = folder + "/" + entry->d_name;
+        struct stat about;
+        if (entry->d_name[0] != '.' && stat(path.c_str(), &about) == 0 && S_ISDIR(about.st_mode)) out.push_back(path);
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+/* Returns the files of this font in the folder and up to three levels below, those in higher folders first. */
+std::vector<std::string> find_files(const std::string &folder, const std::string &font)
+{
+    std::vector<std::string> out, folders = {folder};
+    for (int level = 0; level <= 3; level++) {
+        std::vector<std::string> next;
+        for (const char *ending : {".ttf", ".otf", ".ttc", ".pfb"})
+            for (const std::string &own : folders) {
+                const std::string path = own + "/" + font + ending;
+                if (access(path.c_str(), F_OK) == 0) out.push_back(path);
+            }
+        for (std::size_t i = 0; level < 3 && i < folders.size(); i++)
+            for (const std::string &below : find_folders(folders[i])) next.push_back(below);
+        folders.swap(next);
+    }
     return out;
 }
 
@@ -200,8 +225,11 @@ std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad)
 
 typeface::typeface()
 {
-    if (!succeeded(FT_Init_FreeType(&library_))) return;
+    /* FreeType has an error code of its own for this lack of memory, and leaves out modules that do not fit */
+    if (FT_Init_FreeType(&library_)) throw std::bad_alloc();
     try {
+        for (const char *module : {"truetype", "sfnt", "smooth"})
+            if (!FT_Get_Module(library_, module)) throw std::bad_alloc();
         opened_font font{};
         is_from_system_ = !open_font(library_, split_folders(configured_folders()), font) &&
                           open_font(library_, {"/usr/share/fonts", "/usr/local/share/fonts"}, font);
