@@ -57,11 +57,11 @@ std::vector<std::string> find_files(const std::string &folder, const std::string
     std::vector<std::string> out, folders = {folder};
     for (int level = 0; level <= 3; level++) {
         std::vector<std::string> next;
-        for (const char *ending : {".ttf", ".otf", ".ttc", ".pfb"})
-            for (const std::string &own : folders) {
-                const std::string path = own + "/" + font + ending;
-                if (access(path.c_str(), F_OK) == 0) out.push_back(path);
-            }
+        for (const char *ending : {".ttf", ".otf", ".ttc", ".pfb"}) {
+            const std::string file = "/" + font + ending;
+            for (const std::string &own : folders)
+                if (access((own + file).c_str(), F_OK) == 0) out.push_back(own + file);
+        }
         for (std::size_t i = 0; level < 3 && i < folders.size(); i++)
             for (const std::string &below : find_folders(folders[i])) next.push_back(below);
         folders.swap(next);
