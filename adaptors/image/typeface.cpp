@@ -34,8 +34,8 @@ bool succeeded(FT_Error code)
 
 /* ---- finding a font --------------------------------------------------------------------------------------------- */
 
-/* Returns the folders in this one, sorted by name, without hidden ones. It calls the C library, because the directory
- * iterators of the C++ library end the process if memory runs out, and so does glob(). */
+/* Returns the folders in this one, sorted by name, without hidden ones. It calls opendir(), because the directory
+ * iterators of the C++ library terminate the process if memory runs out, and so does glob() of glibc 2.36. */
 std::vector<std::string> find_folders(const std::string &folder)
 {
     std::vector<std::string> out;
@@ -225,7 +225,8 @@ std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad)
 
 typeface::typeface()
 {
-    /* FreeType has an error code of its own for this lack of memory, and leaves out modules that do not fit */
+    /* FT_Init_FreeType() fails only if memory runs out, but with another error code. It succeeds without the modules
+     * for which there is no memory. */
     if (FT_Init_FreeType(&library_)) throw std::bad_alloc();
     try {
         for (const char *module : {"truetype", "sfnt", "smooth"})
