@@ -345,12 +345,13 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
     c->outcome.hits += count > 0;
     double worst = 0;
     for (int i = 0; same && i < count; i++) {
-        /* Positions and values in float32 have an error of half a unit in the last place of 1, 6e-8 · 2 / cell size,
-         * about 4e-7 cells. On a grazing ray, the conditioning turns an error across the surface into an error of
-         * depth; from a conditioning of 20 on, it exceeds the bound. A value is rounded twice by 6e-8 of the range, at
-         * the two ends of its interval, and a slowly varying field turns this into an error of depth. */
-        const double grazing =
-            fmax(fmax(5e-7 * ray->hits[i].conditioning, 1.2e-7 * ray->hits[i].slowness) - c->bounds->depth, 0);
+        /* A position in float32 has an error of half a unit in the last place of 1, 6e-8 in scaled units or 1.2e-7 in
+         * the scene. On a grazing ray, the conditioning turns an error across the surface into an error of depth; for
+         * cells of 0.3, it exceeds the bound from a conditioning of 25 on. A value is rounded twice by 6e-8 of the
+         * range, at the two ends of its interval, and a slowly varying field turns this into an error of depth. */
+        const double grazing = fmax(1.2e-7 * ray->hits[i].conditioning / c->f->cell_size +
+                                        1.2e-7 * ray->hits[i].slowness - c->bounds->depth,
+                                    0);
         const double off = fabs(fixture_compute_scene_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
         c->outcome.total_depth += off / c->f->cell_size;
         worst = test_larger_error(worst, off / c->f->cell_size - grazing);

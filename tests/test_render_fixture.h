@@ -97,7 +97,7 @@ double drawn_frame_find_largest_difference(const drawn_frame *a, const drawn_fra
 
 /* Bounds of the differences between the kernels and the reference. */
 typedef struct fixture_bounds {
-    double depth;    /* in cells; at least 5e-7 × conditioning is allowed */
+    double depth;    /* in cells; more is allowed on grazing rays and in slowly varying fields (compare_hits()) */
     double colour;   /* difference of a channel of the picture over the background */
     double excluded; /* largest fraction of rays that may be excluded */
     /* distance from a different result within which a ray is excluded: in cells, or in ranges of a cell's values */
