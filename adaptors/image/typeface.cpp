@@ -1,5 +1,6 @@
 /* FreeType reports a lack of memory by error codes; they are converted to std::bad_alloc. Glyphs are hinted, so that
- * they align with pixels and are sharp in small sizes. */
+ * their horizontal edges align with pixels and are sharp in small sizes. FreeType's own hinter is used, because
+ * FreeType 2.12 crashes if memory runs out while it starts its interpreter of the hints that TrueType fonts contain. */
 #include "typeface.h"
 
 #include <ft2build.h>
@@ -24,6 +25,7 @@ namespace
 
 const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans", "DroidSans"};
 const char32_t replacement = 0xFFFD;
+const FT_Int32 load_flags = FT_LOAD_TARGET_LIGHT;
 
 /* Returns whether the call succeeded; throws std::bad_alloc if memory ran out. */
 bool succeeded(FT_Error code)
@@ -229,7 +231,7 @@ typeface::typeface()
      * for which there is no memory. */
     if (FT_Init_FreeType(&library_)) throw std::bad_alloc();
     try {
-        for (const char *module : {"truetype", "sfnt", "smooth"})
+        for (const char *module : {"autofitter", "truetype", "sfnt", "smooth"})
             if (!FT_Get_Module(library_, module)) throw std::bad_alloc();
         opened_font font{};
         is_from_system_ = !open_font(library_, split_folders(configured_folders()), font) &&
@@ -265,7 +267,7 @@ int typeface::advance_of(unsigned glyph, int size) const
 {
     const auto known = advances_.find({size, glyph});
     if (known != advances_.end()) return known->second;
-    const int advance = succeeded(FT_Load_Glyph(face_, glyph, FT_LOAD_DEFAULT)) ? advance_of_loaded(face_) : 0;
+    const int advance = succeeded(FT_Load_Glyph(face_, glyph, load_flags)) ? advance_of_loaded(face_) : 0;
     advances_[{size, glyph}] = advance;
     return advance;
 }
@@ -277,7 +279,7 @@ void typeface::draw(const std::string &text, int size, double halo, const cover_
     const std::vector<char32_t> characters = decode_utf8(text, is_bad);
     if (!(halo > 0)) {
         const FT_GlyphSlot slot = face_->glyph;
-        lay_out_glyphs(face_, characters, size, FT_LOAD_RENDER,
+        lay_out_glyphs(face_, characters, size, load_flags | FT_LOAD_RENDER,
                        [&](int x) { draw_bitmap(slot->bitmap, x + slot->bitmap_left, slot->bitmap_top, cover); });
         return;
     }
@@ -285,7 +287,7 @@ void typeface::draw(const std::string &text, int size, double halo, const cover_
     if (!succeeded(FT_Stroker_New(library_, &stroker))) return;
     const std::unique_ptr<FT_StrokerRec_, void (*)(FT_Stroker)> guard(stroker, FT_Stroker_Done);
     FT_Stroker_Set(stroker, std::lround(64 * halo), FT_STROKER_LINECAP_ROUND, FT_STROKER_LINEJOIN_ROUND, 0);
-    lay_out_glyphs(face_, characters, size, FT_LOAD_NO_BITMAP,
+    lay_out_glyphs(face_, characters, size, load_flags | FT_LOAD_NO_BITMAP,
                    [&](int x) { draw_widened_glyph(face_->glyph, stroker, x, cover); });
 }
 
