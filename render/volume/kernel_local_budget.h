@@ -107,18 +107,22 @@ SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, cons
 }
 
 /* Computes the bounds of a cell whose map is too nonlinear for processing in lanes; all lanes of *out get the same
- * bounds. The map's derivatives are not bounded. `bend` is therefore taken as 1, and the range of the values takes the
- * place of S, the sum of the nonlinear terms' slopes. */
+ * bounds. The map's derivatives are not bounded. N^2 is therefore taken as 3, and the range of the values takes the
+ * place of S, the sum of the nonlinear terms' slopes. E is then at least 1.4 times the error of the polynomial's mean
+ * in 200,000 hexes, wedges and pyramids whose vertices are moved by up to 0.55 edges along each axis, so that some are
+ * nearly folded, with fields that have E = 0, or all three places on the chord. */
 SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
                                             kernel_local_bounds *out)
 {
+    const float bend = 3;
     float values[8][SIMD_WIDTH];
     for (int i = 0; i < c->count; i++) vf_store(values[i], vf_set(c->f[i]));
     vf_store(out->sensitivity, vf_set(0));
     vf_store(out->residual_limit, vf_set(0));
     kernel_local_set_bounds(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
-    vf_store(out->bend, vf_set(1));
-    vf_store(out->unsampled, kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
+    vf_store(out->bend, vf_set(bend));
+    vf_store(out->unsampled,
+             bend * kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
 }
 
 /* ---- rays in cells ---- */

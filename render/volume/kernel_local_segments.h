@@ -210,9 +210,7 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
         kernel_local_restrict_to_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
-        /* in a cell that is not one of the current vector, the whole interval is always halved, because there is no
-         * bound of the deviation that does not show at its three inner places */
-        const vm good = bounds != &b->bounds && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
+        const vm good = vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
         kernel_local_emit(b, &part, good);
         if (!vm_any(rest)) continue;
