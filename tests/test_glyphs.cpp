@@ -94,7 +94,7 @@ class freetype_reference
             FT_Vector kern{0, 0};
             if (before) FT_Get_Kerning(face_, before, glyph, FT_KERNING_DEFAULT, &kern);
             left += static_cast<int>(kern.x >> 6);
-            assert_int_equal(FT_Load_Glyph(face_, glyph, FT_LOAD_RENDER), 0);
+            assert_int_equal(FT_Load_Glyph(face_, glyph, FT_LOAD_TARGET_LIGHT | FT_LOAD_RENDER), 0);
             draw_glyph(out, left, baseline);
             left += static_cast<int>(face_->glyph->advance.x >> 6);
             before = glyph;
