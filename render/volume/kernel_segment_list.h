@@ -302,16 +302,16 @@ SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_s
  * is proportional to the other volumes' optical depth in the same interval. That depth, times the light that arrives
  * there, sums to at most 1 over a ray; so d v / 4 may be the whole error that mixing is allowed. Let s be the
  * extinction, c the colour, b the light from behind, R the contrast, and s' and c' the derivatives by the value. Then d
- * v is at most (R |s'| + s |c'|) times the change of the value times the length, and s |c'| <= cost + R |s'|, because
- * the cost (kernel_light_bounds()) bounds |s c' + s' (c - b)|. */
+ * v is at most (R |s'| + s |c'|) times the change of the value times the length, and s |c'| is at most the cost
+ * (kernel_light_bounds()), which bounds |s c' + s' (c - b)| for all b, among them b = c. */
 SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit_segment *run)
 {
     const kernel_pieces *t = list->pieces;
     const vf low = vf_min(run->v_in, run->v_out), high = vf_max(run->v_in, run->v_out);
     vf bounds[KERNEL_LIGHT_ENTRIES];
     kernel_light_bounds(t, low, high, bounds);
-    const vf steepness = bounds[KERNEL_LIGHT_STEEPNESS];
-    const vf moved = (high - low) * (bounds[KERNEL_LIGHT_COST] + 2.0f * steepness) * run->length * 0.25f;
+    const vf most = bounds[KERNEL_LIGHT_STEEPNESS] + bounds[KERNEL_LIGHT_COST];
+    const vf moved = (high - low) * most * run->length * 0.25f;
     const vf count = vf_min(-vf_floor(-vf_sqrt(moved / list->mixing)), vf_set(KERNEL_MAX_SUBDIVISIONS));
     return 1.0f / vf_max(count, vf_set(1));
 }
