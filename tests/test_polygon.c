@@ -107,14 +107,13 @@ static void make_polygon(int which, polygon *p)
 
 enum { POLYGONS = 300 };
 
-/* Moves the polygon into space by a rotation that depends on `which`. If is_bent is set, also moves corners off the
- * plane by up to 0.1. */
-static void embed_in_space(int which, bool is_bent, polygon *p)
+/* Moves the polygon into space by a rotation that depends on `which`, and its corners off the plane by up to `bend`. */
+static void embed_in_space(int which, double bend, polygon *p)
 {
     const double a = 0.7 * which, b = 1.1 * which;
     for (int i = 0; i < p->count; i++) {
         const double x = p->plane[i][0], y = p->plane[i][1];
-        const double z = is_bent ? 0.1 * sin(3 * x + 2 * y) : 0; /* equal for corners at the same position */
+        const double z = bend * sin(3 * x + 2 * y); /* equal for corners at the same position */
         const double u = cos(a) * x - sin(a) * z, w = sin(a) * x + cos(a) * z;
         p->corners[i][0] = which == 0 ? x : 10 + u;
         p->corners[i][1] = which == 0 ? y : cos(b) * y - sin(b) * w;
@@ -199,7 +198,7 @@ static void polygons_are_covered_once(void **state)
             static cut c;
             double sum = 0;
             make_polygon(which, &p);
-            embed_in_space(which, bent, &p);
+            embed_in_space(which, 0.1 * bent, &p);
             cut_polygon(&p, &c);
             for (int i = 0; i < c.count; i++) sum += compute_triangle_area(&p, c.triangles[i]);
             /* tolerance: roundings of numbers of at most 60 */
@@ -234,14 +233,15 @@ static int list_sorted_triangles(const polygon *p, const cut *c, double (*out)[9
 
 static void triangulation_depends_on_positions_only(void **state)
 {
+    static const double bends[3] = {0, 0.1, 2}; /* with 2, many polygons cross themselves along their normals */
     (void)state;
     for (int which = 0; which < POLYGONS; which++)
-        for (int bent = 0; bent < 2; bent++) {
+        for (int bent = 0; bent < 3; bent++) {
             static polygon p, other;
             static cut c;
             static double own[MOST][9], found[MOST][9];
             make_polygon(which, &p);
-            embed_in_space(which, bent, &p);
+            embed_in_space(which, bends[bent], &p);
             cut_polygon(&p, &c);
             const int count = list_sorted_triangles(&p, &c, own);
             c.count = reference_polygon_triangulate((const double(*)[3])p.corners, p.count, c.triangles);
@@ -271,7 +271,7 @@ static void convex_polygons_are_fans(void **state)
         int least = 0;
         p.count = 0;
         for (int i = 0; i < count; i++) add_vertex(&p, cos(0.1 + 6.28318 * i / count), sin(0.1 + 6.28318 * i / count));
-        embed_in_space(count, true, &p);
+        embed_in_space(count, 0.1, &p);
         for (int i = 1; i < count; i++)
             if (p.corners[i][0] < p.corners[least][0]) least = i;
         cut_polygon(&p, &c);

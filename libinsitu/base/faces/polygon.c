@@ -25,14 +25,13 @@ typedef struct polygon_work {
     /* corners projected into a plane along the polygon's normal; the corners run counterclockwise in this plane */
     double (*projection)[2];
     int *next, *previous; /* doubly linked list of the corners that have not been cut off */
-    char *is_ear;
     int (*triangles)[3];
     int triangle_count;
 } polygon_work;
 
 size_t polygon_work_bytes(int count)
 {
-    return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int) + 1) + 8;
+    return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int));
 }
 
 static polygon_work divide_work(int count, char *work, int (*triangles)[3])
@@ -44,7 +43,6 @@ static polygon_work divide_work(int count, char *work, int (*triangles)[3])
     w.order = (int *)(void *)(work + 5 * n * sizeof(double));
     w.next = w.order + n;
     w.previous = w.next + n;
-    w.is_ear = (char *)(w.previous + n);
     return w;
 }
 
@@ -205,26 +203,16 @@ static bool is_ear(const polygon_work *w, int tip)
     return true;
 }
 
-/* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if
- * there is no ear. */
+/* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if there is
+ * no ear. */
 static int find_ear(const polygon_work *w, int first)
 {
     int i = first;
     do {
         i = w->next[i];
-        if (w->is_ear[i]) return i;
+        if (is_ear(w, i)) return i;
     } while (i != first);
     return -1;
-}
-
-/* Tests all remaining corners for ears again, and returns an ear or -1. Another test is needed because cutting off one
- * corner can turn a second corner into an ear, if the first corner was inside the triangle of the second one. */
-static int find_ear_again(polygon_work *w, int first)
-{
-    int i = first;
-    do w->is_ear[i] = (char)is_ear(w, i);
-    while ((i = w->next[i]) != first);
-    return find_ear(w, first);
 }
 
 /* Returns a corner that is collinear with its two neighbours, or -1 if there is none. */
@@ -240,11 +228,9 @@ static int find_collinear_corner(const polygon_work *w, int first)
 
 static void cut_ears(polygon_work *w)
 {
-    int first = 0, left = w->count;
-    find_ear_again(w, first);
-    for (; left > 3; left--) {
+    int first = 0;
+    for (int left = w->count; left > 3; left--) {
         int ear = find_ear(w, first);
-        if (ear < 0) ear = find_ear_again(w, first);
         if (ear < 0) ear = find_collinear_corner(w, first);
         if (ear < 0) break;
         const int a = w->previous[ear], c = w->next[ear];
@@ -252,8 +238,6 @@ static void cut_ears(polygon_work *w)
         w->next[a] = c;
         w->previous[c] = a;
         if (ear == first) first = c;
-        w->is_ear[a] = (char)is_ear(w, a);
-        w->is_ear[c] = (char)is_ear(w, c);
     }
     add_fan(w, first);
 }
