@@ -10,8 +10,10 @@
  * of their own, 2e-6 of their range. The band is the range of values within this error of the isovalue. A crossing is
  * certain if the field passes from outside the band on one side to outside the band on the other side, within one
  * interval of the ray in the cell. Each certain crossing must have a hit, and each hit must be at a depth at which the
- * field is within the band. Rays whose distance from an edge of the cell is less than the error of positions do not
- * count, because they may miss the cell or not. */
+ * field is within the band. Where a ray crosses a face at a small angle, the rounding of the face's vertices (1e-7)
+ * moves the crossing by 1e-7 divided by the angle's sine; this is added to the error of the depth of a jump at the
+ * face. Rays whose distance from an edge of the cell is less than the error of positions do not count, because they may
+ * miss the cell or not. */
 #include "reference_cell.h"
 #include "reference_polyhedron.h"
 #include "test_mesh_dual.h"
@@ -52,17 +54,18 @@ typedef struct subject {
 } subject;
 
 /* The interval of a ray in a tet, from depth z[0] to z[1] with the values v[0] and v[1]. is_face: whether this end is
- * on the cell's surface. */
+ * on the cell's surface; shift: by how much the end moves if the tet's face moves by 1 along its normal. */
 typedef struct interval {
-    double z[2], v[2], slope;
+    double z[2], v[2], shift[2], slope;
     bool is_face[2];
     int sign;
 } interval;
 
 /* The field along an interval of the ray in the cell, linear between its points. A jump is stored as two points at the
- * same depth. */
+ * same depth. shift: interval.shift of the faces at the path's two ends. */
 typedef struct path {
     int count;
+    double shift[2];
     double z[MOST_POINTS], v[MOST_POINTS];
 } path;
 
@@ -192,8 +195,10 @@ static bool clip_line_to_tet(const tet *t, const reference_line *line, interval 
         const int end = slope < 0;
         const double z = -value / slope;
         if (end ? z >= out->z[1] : z <= out->z[0]) continue;
+        const double *g = t->inside[i].gradient;
         out->z[end] = z;
         out->is_face[end] = i == 3;
+        out->shift[end] = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) / fabs(slope);
     }
     restrict_to_line(&t->value, line, &value, &slope);
     for (int end = 0; end < 2; end++) out->v[end] = value + slope * out->z[end];
@@ -221,8 +226,8 @@ static int find_intervals(const subject *s, const reference_line *line, interval
     return count;
 }
 
-/* Returns the value on the face that the ray meets at depth z. */
-static double find_face_value(const interval *ray_intervals, int count, double z)
+/* Returns the value on the face that the ray meets at depth z, and stores the face's interval.shift in *shift. */
+static double find_face_value(const interval *ray_intervals, int count, double z, double *shift)
 {
     double nearest = (double)INFINITY, value = 0;
     for (int i = 0; i < count; i++)
@@ -231,6 +236,7 @@ static double find_face_value(const interval *ray_intervals, int count, double z
             if (!ray_intervals[i].is_face[end] || away >= nearest) continue;
             nearest = away;
             value = ray_intervals[i].v[end];
+            *shift = ray_intervals[i].shift[end];
         }
     assert_true(nearest < 1e-9);
     return value;
@@ -260,7 +266,7 @@ static bool add_piece(const interval *ray_intervals, int count, double z0, doubl
         if (cover && z1 - z0 > 1e-9) fail_msg("a place is in the cell %d times", cover);
         return false;
     }
-    if (!p->count) add_point(p, z0, find_face_value(ray_intervals, count, z0));
+    if (!p->count) add_point(p, z0, find_face_value(ray_intervals, count, z0, &p->shift[0]));
     add_point(p, z0, v[0]);
     add_point(p, z1, v[1]);
     return true;
@@ -274,7 +280,8 @@ static bool make_next_path(const interval *ray_intervals, int count, const doubl
         if (ends[*next + 1] - ends[*next] < 1e-13) continue;
         if (!add_piece(ray_intervals, count, ends[*next], ends[*next + 1], p) && p->count) break;
     }
-    if (p->count) add_point(p, p->z[p->count - 1], find_face_value(ray_intervals, count, p->z[p->count - 1]));
+    const double last = p->count ? p->z[p->count - 1] : 0;
+    if (p->count) add_point(p, last, find_face_value(ray_intervals, count, last, &p->shift[1]));
     return p->count > 0;
 }
 
@@ -311,11 +318,20 @@ typedef struct verify {
     tally *t;
 } verify;
 
-/* Returns whether there is a hit between the two depths, which are widened by the error of positions. */
-static bool has_hit(const verify *j, const ray_hits *hits, double from, double to)
+/* Returns the error of depths between the points k and k + 1 of the path. It is larger for a jump at a face, which is
+ * between the first or the last two points. */
+static double compute_depth_error(const verify *j, const path *p, int k)
+{
+    const double rounding = 1e-7 / j->f->job.space.scale;
+    if (k == 0) return j->place + rounding * p->shift[0];
+    return k + 2 == p->count ? j->place + rounding * p->shift[1] : j->place;
+}
+
+/* Returns whether there is a hit between the two depths, which are widened by the given error. */
+static bool has_hit(const ray_hits *hits, double from, double to, double error)
 {
     for (int i = 0; i < hits->count; i++)
-        if (from - j->place <= hits->z[i] && hits->z[i] <= to + j->place) return true;
+        if (from - error <= hits->z[i] && hits->z[i] <= to + error) return true;
     return false;
 }
 
@@ -324,7 +340,8 @@ static void mark_hits(const verify *j, const path *p, double band, ray_hits *hit
 {
     for (int i = 0; i < hits->count; i++)
         for (int k = 0; k + 1 < p->count; k++) {
-            const double z0 = fmax(p->z[k], hits->z[i] - j->place), z1 = fmin(p->z[k + 1], hits->z[i] + j->place);
+            const double error = compute_depth_error(j, p, k);
+            const double z0 = fmax(p->z[k], hits->z[i] - error), z1 = fmin(p->z[k + 1], hits->z[i] + error);
             if (z0 > z1) continue;
             const double length = p->z[k + 1] - p->z[k], rise = p->v[k + 1] - p->v[k];
             const double v0 = length > 0 ? p->v[k] + (z0 - p->z[k]) / length * rise : p->v[k];
@@ -348,7 +365,7 @@ static bool verify_path(const verify *j, const path *p, double band, const ray_h
         if (now && side && now != side) {
             j->t->certain++;
             j->t->inner += is_inner;
-            if (!has_hit(j, hits, j->is_opaque ? 0 : since, p->z[k])) {
+            if (!has_hit(hits, j->is_opaque ? 0 : since, p->z[k], compute_depth_error(j, p, k - 1))) {
                 j->t->missed++;
                 return false;
             }
