@@ -24,9 +24,11 @@ def read_words(path):
 
 def read_tests():
     """The commands of the registered tests, by their names without the number of ranks."""
-    tests = {}
-    for file in build.rglob("CTestTestfile.cmake"):
-        for name, command in re.findall(r"add_test\(\[=\[(.*?)\]=\] (.*?)\)\n", file.read_text(), re.S):
+    tests, folders = {}, [build]
+    for folder in folders:
+        text = (folder / "CTestTestfile.cmake").read_text()
+        folders += [folder / name for name in re.findall(r'^subdirs\("(.*?)"\)', text, re.M)]
+        for name, command in re.findall(r"add_test\(\[=\[(.*?)\]=\] (.*?)\)\n", text, re.S):
             tests.setdefault(re.sub(r"_np\d+$", "", name), []).append(command)
     return tests
 
