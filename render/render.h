@@ -1,5 +1,6 @@
-/* Renders this rank's cells to fragments (fragment.h): camera, layers, and the one call that draws a frame. It does not
- * use MPI. "The thesis" in comments is the one that first described the method (docs/development/architecture.md).
+/* Draws this rank's cells as fragments (fragment.h): defines the camera, the layers and the job of a frame, and
+ * declares the functions that draw the frame. They do not use MPI. "The thesis" in comments is the thesis that first
+ * described the method (docs/development/architecture.md).
  *
  * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
  * axis: perspective cameras have the slope, orthographic ones the offset. In all files of render/ the ray's parameter
@@ -70,9 +71,10 @@ typedef struct render_space {
  * (render_scaled()). */
 typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_scale;
 
-/* Compute the scale's function s, which is monotone, and its inverse. RENDER_LOG: ln value, -infinity if value <= 0.
- * RENDER_SYMLOG: value / threshold for |value| <= threshold (> 0); 1 + ln(value / threshold) above, and the negative
- * mirror image below, so that s and its slope are continuous. */
+/* render_scaled() returns s(value), where s is the monotone function that belongs to the scale. render_unscaled() is
+ * its inverse: it returns the value for which s(value) = scaled. RENDER_LINEAR: s(value) = value. RENDER_LOG: s(value)
+ * = ln value, -infinity if value <= 0. RENDER_SYMLOG: s(value) = value / threshold for |value| <= threshold (> 0); 1 +
+ * ln(value / threshold) above, and the negative mirror image below, so that s and its slope are continuous. */
 double render_scaled(render_scale scale, double threshold, double value);
 double render_unscaled(render_scale scale, double threshold, double scaled);
 
@@ -96,9 +98,9 @@ typedef struct render_transfer {
     /* For surfaces only: colours belong to bands of equal width and are not interpolated; colour_count may then be
      * 1. */
     bool is_banded;
-    /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. Values within
-     * RENDER_END of an end belong to the range. NULL: values outside get the colours of low and high, and NaN gets
-     * RENDER_NO_COLOUR. */
+    /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. A value that is
+     * outside the range by no more than the rounding error RENDER_END still counts as inside. NULL: values outside get
+     * the colours of low and high, and NaN gets RENDER_NO_COLOUR. */
     const float *outside;
     /* number of opacity points, 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, whose transfer functions have no
      * opacity */
@@ -130,8 +132,8 @@ static inline bool render_takes_light(const render_material *m)
     return m->diffuse != 0 || m->specular != 0;
 }
 
-/* One field over all mesh parts: fields[i] and ranges[i] belong to parts[i]. If ranges[i].low is NULL, the field does
- * not exist on that part. */
+/* One field on all mesh parts of a job: fields[i] has the values on parts[i], and ranges[i] has the range of values in
+ * each node of the tree of parts[i]. If ranges[i].low is NULL, the field does not exist on parts[i]. */
 typedef struct render_field {
     const grid_field *fields;
     const mmbvh_ranges *ranges;
@@ -176,16 +178,17 @@ typedef struct render_difference_samples {
 /* Value of `transmittance` that marks the placeholder fragments of pending hits while a frame is traced. */
 #define RENDER_PENDING_TRANSMITTANCE 2.0f
 
-/* Gradients at the vertices of a mesh part, of any length. All vertices of cells that the layer's isovalues cross have
- * one. */
+/* Gradients of a surface layer's field at the vertices of one mesh part; they need not be unit vectors. Every vertex of
+ * a cell that one of the layer's isovalues crosses has a gradient. */
 typedef struct render_vertex_gradients {
-    /* per vertex, its index into gradients, or -1 if it has none; NULL if the part has no crossed cells */
+    /* for each vertex, the index of its entry in `gradients`, or -1 if it has no gradient; NULL if no isovalue crosses
+     * a cell of the part */
     const int32_t *entries;
     const float (*gradients)[3]; /* gradients in world axes */
 } render_vertex_gradients;
 
-/* Contour lines on a surface. A line replaces the hit's colour, before lighting, by the share of the pixel that it
- * covers. Lines that are less than two widths apart fade. */
+/* Contour lines on a surface. The line's colour replaces the hit's colour, before lighting, in proportion to the share
+ * of the pixel that the line covers. Lines that are less than two line widths apart fade. */
 typedef struct render_lines {
     /* The field whose contours are drawn, vertex-centred. It must have values (or NaN) on every part that has the
      * surface; its ranges are not used. */
@@ -236,8 +239,8 @@ typedef struct render_volume_layer {
     const render_transfer *transfer;
 } render_volume_layer;
 
-/* Upper bound of how far rounding may move a value that is at an end of the range, as a fraction of the colour table's
- * length. */
+/* Upper bound of the distance by which rounding may move a value that is at an end of the colour table's range, as a
+ * fraction of the table's length. */
 #define RENDER_END 4e-6f
 
 /* Linear grey level of surfaces at points at which their colour field is NaN. It is the sRGB colour 0.6 in float. */
@@ -377,8 +380,8 @@ typedef struct render_statistics {
     double surface_ms, volume_ms;
 } render_statistics;
 
-/* Returns the position of a pixel's first sample in a frame, in steps, in [0, 1). The position is a hash of the pixel's
- * index and the frame's number. */
+/* Returns the distance of the first sample on a pixel's ray from the eye (orthographic: from the eye's plane), in
+ * steps, in [0, 1). It is a hash of the pixel's index and the frame's number. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
 /* Compute intervals of visible values: a cell is invisible if its range of values, rounded to float, overlaps none of
@@ -397,8 +400,8 @@ insitu_status render_frame_tiles(const render_job *job, fragment_callback *take,
                                  render_statistics *statistics, base_error *error);
 
 /* Returns the instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may select a
- * lower one than the machine's best; a name that is unknown or not available is ignored, and render_isa_warning()
- * returns a message. */
+ * lower one than the machine's best; a name that is unknown or not available is ignored. In that case
+ * render_isa_warning() returns a message, otherwise an empty string. */
 const char *render_isa(void);
 const char *render_isa_warning(void);
 

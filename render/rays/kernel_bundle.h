@@ -1,12 +1,12 @@
 /* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
  *
- * The cells that such a ray meets must not depend on the partition. Rays are traced by the functions for primary rays.
- * These decide from the face's vertices in tile space alone whether and where a ray crosses a face. For the result to
- * depend only on the ray and the cell, the tile space must depend only on the ray. For the rays of a hit's hemisphere,
- * the eye of the tile space is the hit, and depth is measured along the hit's normal. For rays to a light, depth is
- * measured along the light's direction, and the plane across it is divided into square tiles; a ray belongs to the tile
- * in which it lies. A bundle is a set of rays with the same tile space. The result does not depend on which of them are
- * in one bundle. */
+ * The cells that such a ray meets must not depend on the partition. The rays are traced by the functions for primary
+ * rays. These decide whether and where a ray crosses a face only from the positions of the face's vertices in tile
+ * space. So the tile space must depend only on the ray; then the result depends only on the ray and the cell. For the
+ * rays of a hit's hemisphere, the eye of the tile space is the hit, and depth is measured along the hit's normal. For
+ * rays to a light, depth is measured along the light's direction. The plane perpendicular to this direction is divided
+ * into square tiles, and a ray belongs to the tile in which it crosses the plane. A bundle is a set of rays with the
+ * same tile space. The result does not depend on which of them are in one bundle. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 

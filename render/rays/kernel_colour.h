@@ -13,8 +13,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent. *absorbed becomes
- * 1 minus the transmittance, computed without cancellation. */
+/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent. exponent: the
+ * sample's length in unit distances (kernel_transfer.exponent). *absorbed becomes 1 minus the transmittance, computed
+ * without cancellation. */
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
@@ -62,7 +63,8 @@ SIMD_INLINE vf kernel_find_colour_table_position(const kernel_transfer *t, vf x)
     return t->scale == RENDER_LINEAR ? x : kernel_scaled_position(t, x);
 }
 
-/* Computes the colour at a position in the table; NaN gives the first colour. */
+/* Computes the colour at the position `along` in the colour table, from 0 at its first to 1 at its last entry; NaN
+ * gives the first colour. */
 SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
 {
     const vf place = vf_clamp(along, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
@@ -201,7 +203,7 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
 }
 
 /* Computes colours from tables with bands of constant colour, or with separate colours for values outside the range and
- * NaN. */
+ * NaN. w: the values, in the transfer function's domain. */
 static __attribute__((noinline)) void kernel_special_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_find_colour_table_position(t, w), one = vf_set(1), zero = vf_set(0);

@@ -25,10 +25,10 @@ typedef struct kernel_packet {
     bool has_view;
     /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* Set if edge functions on the rays are computed from lines: affine functions of (u, v), which is a camera ray's
-     * slope or, if the camera is orthographic, its origin (kernel_cell.h). Lines are used for camera rays through the
-     * tile's pixels, except for segments of volumes. For all other rays, edge functions are computed from projected
-     * vertices. */
+    /* Set if edge functions are computed on the rays from the lines of the cells' edges (kernel_cell.h). A line is an
+     * affine function of (u, v), which is a camera ray's slope or, if the camera is orthographic, its origin. Lines are
+     * used for camera rays through the tile's pixels, except for segments of volumes. For all other rays, edge
+     * functions are computed from projected vertices. */
     bool is_pencil;
     vf u, v;
     vf t_near; /* t at which the rays begin: that of the eye's plane, or clip_in if that is farther */

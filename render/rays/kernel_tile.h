@@ -1,5 +1,6 @@
-/* Classifies bodies by the blocks of a tile that they may meet. A tile of 16 × 16 pixels has 4 × 4 blocks of 4 × 4
- * pixels, for every instruction set; a block has one or more packets:
+/* Finds the blocks of a tile in which a body may be visible. A body is the box of a tree's node, or the convex hull of
+ * points of a cell. A tile of 16 × 16 pixels has 4 × 4 blocks of 4 × 4 pixels, for every instruction set; a block has
+ * one or more packets:
  *
  *     border     0     1     2     3     4
  *          0     +-----+-----+-----+-----+
@@ -9,12 +10,13 @@
  *          2     +-----+-----+-----+-----+      border may touch the columns on both sides. The masks of columns and
  *                                               of rows together give a mask of blocks.
  *
- * A body is a node's box, or the convex hull of points of a cell. Each plane is one lane of a vector. Two more lanes
- * are the depth and the distance along the direction of the tile's middle ray. So a body's extents in all lanes are
- * computed at once. Planes through the eye give correct masks only for bodies in front of the eye; all others lie
- * before the rays begin. A body that intersects the eye's plane lies on both sides of the borders of all blocks in
- * which it may be visible, so these blocks are in the mask. Bodies are extended by more than all rounding, so masks are
- * never too small. Masks only select where to test; they never change the result. */
+ * Each plane is one lane of a vector, which holds a point's signed distance from the plane. Two more lanes hold the
+ * point's depth and its distance along the direction of the tile's middle ray. So the least and the greatest of each of
+ * these numbers in a body are computed at once; they are called the body's extent in the lane. Planes through the eye
+ * give correct masks only for bodies in front of the eye; all others lie before the rays begin. A body that intersects
+ * the eye's plane lies on both sides of the borders of all blocks in which it may be visible, so these blocks are in
+ * the mask. Bodies are extended by more than all rounding, so masks are never too small. Masks only select where to
+ * test; they never change the result. */
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
@@ -204,8 +206,9 @@ typedef struct kernel_placement {
     float near, far, along;
 } kernel_placement;
 
-/* Sets the bits of one vector of planes in the placement. v: index of the vector; low, high: the body's least and
- * greatest signed distance from each plane. */
+/* Sets the bits of one vector of planes in the masks `below` and `above` of the placement. v: index of the vector; low,
+ * high: the body's least and greatest signed distance from each plane. If the vector has the lane of depths, `near` and
+ * `far` are set too. */
 SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low, vf high)
 {
     placement->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
@@ -223,7 +226,8 @@ SIMD_INLINE void kernel_placement_find_blocks(kernel_placement *placement)
     placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
-/* Computes a node's extent in all lanes, and from this the blocks in which its box may be visible. */
+/* Computes the extent of a node's box in all lanes (see the top of this file), and from this the blocks in which the
+ * box may be visible. */
 SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
@@ -246,8 +250,8 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
  * than all rounding errors, so that a ray that hits the cell only by rounding is still inside. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-/* Computes the extent of points in tile space in all lanes, and from this the blocks in which their convex hull may be
- * visible. places: the points' x, y and z. */
+/* Computes the extent of points in all lanes (see the top of this file), and from this the blocks in which their convex
+ * hull may be visible. places: x, y and z of the points in tile space. */
 SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, const float *const places[3], int count)
 {
     kernel_placement placement = {0};

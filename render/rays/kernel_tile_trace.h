@@ -24,10 +24,12 @@ typedef struct kernel_tile_trace {
     kernel_planes tree_planes, tile_planes;
     unsigned traced_blocks; /* mask of the blocks that contain pixels to trace */
     unsigned begun;         /* mask of the blocks whose packets have been set up */
-    /* index of the interval of each ray in which volumes are being traced; the clips of volumes leave these intervals
-     * (kernel_clip.h) */
+    /* The clips of volumes may divide each ray into several intervals (kernel_clip.h). This is the index of the
+     * interval in which volumes are being traced. */
     int clip_interval;
-    float t_near; /* t at the eye's plane; while volumes are traced, least t of the current window */
+    /* t at the eye's plane; while volumes are traced, least t of the window, the range of depths that is being
+     * traced */
+    float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
     float pixel_far[KERNEL_TILE_PIXELS];
@@ -252,7 +254,7 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
     }
 }
 
-/* Appends the rays of all pixels of the given blocks, packet by packet. */
+/* Appends the rays of all pixels of the given blocks, packet by packet. lane: the lane that holds the rays' cell. */
 SIMD_INLINE void kernel_pixel_list_add_blocks(kernel_pixel_list *rays, unsigned blocks, int lane)
 {
     /* pixels of the tile's first block by position in the block (kernel_pixel_position()) */
@@ -288,7 +290,8 @@ SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Returns the position of a pixel among the tile's packets, which is packet * SIMD_WIDTH + lane. */
+/* Returns the position of a pixel among the tile's packets: the index of its packet times SIMD_WIDTH, plus its lane in
+ * the packet. */
 SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
 {
     const vi block = (row & ~3) + (column >> 2);
@@ -356,7 +359,7 @@ SIMD_INLINE void kernel_lane_rays_set_far(kernel_lane_rays *r, const kernel_tile
     r->far = kernel_gather_packet_member(&t->packets[0].t_far, r->at);
 }
 
-/* Returns the index in the tile of the packet that has a pixel (16 * row + column). */
+/* Returns the index, among the tile's packets, of the packet that contains a pixel. pixel: 16 * row + column. */
 SIMD_INLINE int kernel_packet_of_pixel(int pixel)
 {
     const int column = pixel & (KERNEL_TILE - 1), row = pixel >> 4;

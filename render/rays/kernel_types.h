@@ -41,8 +41,8 @@ enum {
 _Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
 
 /* KERNEL_BLACK: a segment is integrated only until its transmittance falls below this value. KERNEL_SHORT: no
- * integration step needs to be shorter than this, in unit distances (render_transfer). It need not be shorter than this
- * fraction of the length that the ray has in one piece of the transfer function either (kernel_integral.h). */
+ * integration step needs to be shorter than this, in unit distances (render_transfer). Nor does a step need to be
+ * shorter than this fraction of the ray's length in one piece of the transfer function (kernel_integral.h). */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
@@ -56,11 +56,11 @@ typedef float kernel_real;
 enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
 /* Entries of a piece of a transfer function. A piece is a range of values, from low to high, on which opacity and
- * colour are linear. At a value x in this range, the opacity is its value at `low` plus (x - low) times its slope, and
- * so is each channel of the colour. 1 - opacity has entries of its own, because near an opacity of 1 the computed
- * difference would consist of rounding errors only. The function is constant below its first and above its last point.
- * The infinite ends of the first and the last piece are replaced by -+2^100, so that KERNEL_PIECE_INVERSE times the
- * width is still 1. */
+ * colour are linear. At a value x in this range, the opacity is the opacity at `low` plus (x - low) times its slope.
+ * Each channel of the colour is computed in the same way. 1 - opacity is stored separately, because near an opacity of
+ * 1 the computed difference would consist of rounding errors only. The function is constant below its first and above
+ * its last point. The infinite ends of the first and the last piece are replaced by -+2^100, so that
+ * KERNEL_PIECE_INVERSE times the width is still 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
@@ -87,21 +87,22 @@ typedef struct kernel_bound {
 
 /* Entries of a row of kernel_pieces.variations: bounds over a range of values in which the opacity has no step. Suppose
  * that the field has a small error e along one unit distance of a ray, and that this changes a channel of the pixel's
- * light by g e. KERNEL_LIGHT_COST is the maximum of |g| over the range of values and over all colours of the light from
- * behind. KERNEL_LIGHT_VARIATION is the largest difference of g between two values of the range, for the same channel
- * and the same light from behind. */
+ * light by g e. g depends on the field's value and on the light that comes from behind this place. KERNEL_LIGHT_COST is
+ * the maximum of |g| over the range of values and over all colours of that light. KERNEL_LIGHT_VARIATION is the largest
+ * difference between the g of two values of the range, for the same channel and the same light from behind. */
 enum {
     KERNEL_LIGHT_VARIATION,
     KERNEL_LIGHT_COST,
     KERNEL_LIGHT_EXTINCTION, /* maximum of the extinction */
-    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's slope, times the contrast of colours */
+    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's |slope|, times kernel_pieces.contrast */
     KERNEL_LIGHT_ENTRIES
 };
 
 /* A bin (a range of values) of the table of sums for preintegration (kernel_preintegral.h). In each array, element 0 is
- * a sum of extinctions, and elements 1 to 3 are sums of the emission in the three colour channels. Sums are integers. A
- * sum over n bins, divided by n, is the mean extinction in units of depth_unit, or the mean emission in units of
- * light_unit. The struct is read as rows of four floats. */
+ * a sum of extinctions, and elements 1 to 3 are sums of the emission (extinction times colour) in the three colour
+ * channels. Sums are integers. A sum over n bins, divided by n, is the average extinction over these bins in units of
+ * depth_unit, or the average emission in units of light_unit (kernel_preintegral). The struct is read as rows of four
+ * floats. */
 typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];      /* sums over this bin; integers, stored as floats */
@@ -120,9 +121,9 @@ typedef struct kernel_preintegral {
     /* colour_unit: unit of packed colours; colour_error: upper bound of the deviation of a colour from that of its bin
      */
     float colour_unit, colour_error;
-    /* The deviation of a colour channel from its chord over a range of values of width h is at most h (h bend_square +
-     * bend) + colour_error. If the range extends beyond the ends of the colour table, the smaller of h bend_at_ends and
-     * contrast is added. */
+    /* Over a range of values of width h, let the chord be the linear function that equals a colour channel at both ends
+     * of the range. The channel deviates from its chord by at most h (h bend_square + bend) + colour_error. If the
+     * range extends beyond the ends of the colour table, the smaller of h bend_at_ends and contrast is added. */
     float bend_square, bend, bend_at_ends, contrast;
     /* error of light that a segment may have: allowed_absorbed per unit of its absorption, plus allowed_length per unit
      * distance of its length */
@@ -268,7 +269,8 @@ typedef struct kernel_bin {
     int64_t capacity;
 } kernel_bin;
 
-/* Returns a mask with the bit of each block that lies in one of the given columns and rows of blocks. */
+/* Returns a mask of the blocks that lie both in one of the given columns and in one of the given rows of blocks.
+ * columns, rows: masks with one bit for each column or row. */
 static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 {
     /* spread[rows] is a mask that has, for each row in the mask `rows`, the bit of the row's first block */
@@ -388,14 +390,14 @@ struct kernel_secondary_rays;
 typedef struct kernel_table {
     int width;
     size_t memory_bytes;
-    void (*begin)(kernel_thread *thread); /* sets up the thread's memory at the start of a frame */
+    void (*begin)(kernel_thread *thread); /* sets pointers into the thread's memory at the start of a frame */
     /* Traces the tile whose upper left pixel is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
     /* Adds to the list the candidates of a subtree. grow() adds space, or marks the list as full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
-    /* Secondary rays lead from hits to lights or into the hemisphere. Clears the bits of those that an opaque surface
-     * certainly blocks, and records the pairs of a ray and a cell that must be tested exactly. */
+    /* Secondary rays lead from hits to lights or into the hemisphere. Clears is_open of the secondary rays that an
+     * opaque surface certainly blocks, and records the ray-cell pairs that must be tested exactly. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
                     struct kernel_secondary_rays *rays);
     /* Clears the bits in bundle->open of the rays that the surface in this cell blocks. */

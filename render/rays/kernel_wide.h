@@ -1,7 +1,7 @@
-/* Vectors of doubles, and permutations of vectors in which each lane holds a number of one cell: they give each ray the
- * number of its own cell. A kernel_f64 has SIMD_WIDTH / 2 doubles and fills one register, because compilers split
- * larger vectors and compare their lanes one by one. SIMD_WIDTH doubles, one per lane, are therefore stored as two
- * halves: half 0 has the first SIMD_WIDTH / 2 lanes, half 1 the others. A parameter `half` selects one of them. */
+/* Vectors of doubles. Also defines how rays, one per lane, gather numbers of their cells from a vector in which each
+ * lane holds the number of one cell. A kernel_f64 has SIMD_WIDTH / 2 doubles and fills one register, because compilers
+ * split larger vectors and compare their lanes one by one. SIMD_WIDTH doubles, one per lane, are therefore stored as
+ * two halves: half 0 has the first SIMD_WIDTH / 2 lanes, half 1 the others. A parameter `half` selects one of them. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 

@@ -26,8 +26,8 @@ void hit_axes_around(const double n[3], double axes[3][3]);
 /* Unpacks the unit normal of an unlit fragment from its octahedral encoding. */
 void hit_normal(const float folded[2], double n[3]);
 
-/* Computes the position and axes of a hit at depth t on the pixel's ray. Its rays begin `lift` scaled units above the
- * surface. */
+/* Computes the hit_frame of a hit at depth t on the pixel's ray. normal: the encoded normal (hit_normal()); lift:
+ * height above the surface, in scaled units, at which the hit's rays begin. */
 hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
 
 /* Computes the unit directions of the rays for ambient occlusion of the pixel's hit (job->occlusion->samples of them),
