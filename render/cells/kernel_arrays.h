@@ -14,7 +14,8 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* One coordinate or component of the field, as an array that is read by vertex or cell index. */
+/* One coordinate of a mesh part's vertices, or one component of its field, as an array that is read by vertex or cell
+ * index. */
 typedef struct kernel_numbers {
     /* first number; NULL if the array cannot be gathered: it is too large, or neither float32 nor float64 */
     const float *data;
@@ -279,8 +280,8 @@ SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 }
 
 /* Reads the coordinates of hexes of a uniform or rectilinear lattice, one per lane. first: index of each hex's first
- * vertex; cells: coordinates of that vertex (cells[0]) and of the opposite one (cells[1]), by axis. It reads 6 numbers
- * per hex instead of 24. */
+ * vertex; cells: coordinates of that vertex (cells[0]) and of the opposite vertex of the hex (cells[1]), by axis and
+ * half of the lanes. It reads 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
                                                                 kernel_f64 cells[2][3][2])
 {
@@ -298,8 +299,9 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
 
 /* ---- comparisons with a value ---- */
 
-/* A value that numbers are compared with or subtracted from. value: in double; middle + rest: as the sum of two
- * float32; least: smallest float32 that is not below it. */
+/* A number with which others are compared, or which is subtracted from them, for example an isovalue. value: the number
+ * in double; middle + rest: the same number as the sum of two float32; least: the smallest float32 that is not below
+ * it. */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;

@@ -1,13 +1,14 @@
 /* Computes bounds on the maps and fields of hexes, wedges or pyramids, one cell per lane. The bounds hold for all rays
  * of a tile; the header comment of kernel_roots.h defines the quantities that are bounded. A derivative that does not
- * depend on all three coordinates is computed once for all corners that share it.
+ * depend on all three coordinates has the same value at several corners, and is computed once for these.
  *
- * Let the position X and the field F be functions of the reference coordinates r, J the Jacobian of X, and J0 its value
- * at the cell's centre. N is the nonlinear part of J0^-1 X, so that J0^-1 X = r + N(r) + const. Let L be a linear
- * function of the position whose gradient is the field's at the cell's centre, and E = F - L(X). E is a polynomial like
- * F, and small if the field is smooth. Along a ray of direction d, L(X) is linear and r has the derivative J^-1 d. If
- * |grad L . d| is larger than the maximum of grad E . J^-1 d, F is monotone along every ray in the cell. And if L at
- * both ends of an interval is farther from 0 than the largest |E|, on the same side, the interval has no root. */
+ * Let the position X and the field F, from which the isovalue has been subtracted, be functions of the reference
+ * coordinates r. J is the Jacobian of X, and J0 its value at the cell's centre. N is the nonlinear part of J0^-1 X, so
+ * that J0^-1 X = r + N(r) + const. Let L be a linear function of the position whose gradient is the field's at the
+ * cell's centre, and E = F - L(X). E is a polynomial like F, and small if the field is smooth. Along a ray of direction
+ * d, L(X) is linear and r has the derivative J^-1 d. If |grad L . d| is larger than the maximum of grad E . J^-1 d, F
+ * is monotone along every ray in the cell. And if L at both ends of an interval is farther from 0 than the largest |E|,
+ * on the same side, the interval has no root. */
 #ifndef RENDER_KERNEL_BOUNDS_H
 #define RENDER_KERNEL_BOUNDS_H
 
@@ -50,7 +51,9 @@ typedef struct kernel_bounds {
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
     float error_growth[SIMD_WIDTH];
-    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH]; /* defined in kernel_contraction.h */
+    /* In reference coordinates: error_bound is the error bound of the iteration's result, and domain_margin an upper
+     * bound of the distance by which rounding moves a root (kernel_contraction.h). */
+    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
 } kernel_bounds;
 
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
@@ -348,8 +351,9 @@ SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, c
     b->most_turn = kernel_f64_sqrt(most_turn);
 }
 
-/* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
- * lie. They are moved outward by `pad`, an upper bound of the error of a ray's positions in reference coordinates. */
+/* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices lie
+ * (out->normal, low and high). The planes are moved outward by `pad`, an upper bound of the error of a ray's positions
+ * in reference coordinates. */
 SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad, int half,
                                    kernel_bounds *out)
 {
@@ -378,18 +382,20 @@ SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlin
 
 /* Computes error_growth = K / (1 - K), where K is the contraction's constant, and the bounds of rounding errors in
  * reference coordinates r. Let u = 6e-8, let e be the largest distance of a vertex from vertex 0 along an axis, and let
- * `wide` be the maximum of |x| and |y| over rays and vertices. y, w, L and E are those of kernel_contraction.h. Three
- * errors of r add up to error_bound:
+ * `wide` be the maximum of |x| and |y| over rays and vertices. y and w (the ray's point and direction in reference
+ * coordinates), L and E (which sum to the field) are those of kernel_contraction.h. Three errors of r add up to
+ * error_bound:
  *
  * y and w have errors of about 4 u |inverse| times `wide` across the ray, and times e along each axis. The rounding of
- * the inverse itself is included. The code takes an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions
- * of faces, and 3e-7 e.
+ * the inverse itself is included. For the first of these two errors the code uses an eighth of the 2e-6 that
+ * kernel_f64_bounds() uses for the positions of faces, for the second 3e-7 e.
  *
  * L and E have errors of 4 u times 2, the bound of values (domain_margin has a factor 2 for this), and of 4 u times the
  * gradient, times `wide` across and e along the ray. The rounding of the gradient itself adds as much again: 5e-7 in
  * all. Divided by the field's derivative along the ray, and multiplied by |w|, this is an error of r.
  *
- * The iteration adds a few units in the last place of r. Near a pyramid's apex k is at least 1e-6. The code takes 1e-6.
+ * The iteration adds a few units in the last place of r. Near a pyramid's apex k is at least 1e-6. The code uses 1e-6
+ * for this error.
  *
  * domain_margin is an upper bound of the distance by which rounding errors move a root, compared with the root that is
  * found between the computed crossings of faces. These crossings lie within `gap` of the ray, and the values there

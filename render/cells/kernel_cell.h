@@ -95,8 +95,8 @@ SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile 
     return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
 }
 
-/* Computes the edge function of the edge from a to b, where a is before b in the order of coordinates. size_a, size_b:
- * kernel_position_size() of the vertices. */
+/* Computes the line (the affine edge function) of the edge from a to b, where a is before b in the order of
+ * coordinates. size_a, size_b: kernel_position_size() of the vertices. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_position a, kernel_tile_position b,
                                             float size_a, float size_b)
 {
@@ -155,7 +155,7 @@ typedef struct kernel_cell {
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
     bool is_finite;         /* set if the values at all vertices are finite */
     bool is_transformed;    /* set if x, y and z are computed */
-    bool is_constant;       /* set if all values in f are equal; computed for volumes only */
+    bool is_constant;       /* set if the values at all vertices are equal; computed for volumes only */
     bool has_lines;         /* set if `lines` is computed */
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -169,7 +169,7 @@ typedef struct kernel_cell {
     /* vertex values of the colour field, in its transfer function's domain; not set for tets */
     float g[GRID_MAX_CELL_VERTICES];
     int rank[GRID_MAX_CELL_VERTICES]; /* rank of each vertex in the lexicographic order of coordinates */
-    /* edge functions of the edges, then of the quads' diagonals; not computed for tets */
+    /* lines of the edges, then of the quads' diagonals; not computed for tets */
     kernel_line lines[KERNEL_MAX_LINES];
     /* upper bound, for all triangles, of the least sum of weights at which a crossing is accurate
      * (kernel_least_weight()) */
@@ -177,8 +177,8 @@ typedef struct kernel_cell {
 } kernel_cell;
 
 /* An interval of each ray inside a cell. The members _in belong to the crossing at which the ray enters the cell, the
- * members _out to the one at which it leaves. t: depth; v, w: kernel_cell.f and kernel_cell.g, interpolated; r:
- * reference coordinates. mask: the rays that have an interval. */
+ * members _out to the one at which it leaves. t: depth; v: the layer's field (interpolated from kernel_cell.f); w: the
+ * colour field (from kernel_cell.g); r: reference coordinates. mask: the rays that have an interval. */
 typedef struct kernel_interval {
     vm mask;
     vf t_in, t_out, v_in, v_out;
@@ -228,8 +228,9 @@ static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4],
 }
 
 /* Returns whether a polyhedron is a tet, and lists its vertices. Such a polyhedron is drawn bit for bit like a tet with
- * these vertices. It must have four vertices, and for each of them exactly one triangle that does not contain it. (Two
- * triangles that each occur twice enclose no volume.) Faces that have collapsed to a point are ignored. */
+ * these vertices. A polyhedron is a tet if it has four vertices, and for each of them exactly one triangle that does
+ * not contain this vertex. (Two triangles that each occur twice enclose no volume.) Faces that have collapsed to a
+ * point are ignored. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
     int64_t first, end;
@@ -433,7 +434,7 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- edge functions of a cell ---- */
 
-/* Computes the edge functions of a hex, wedge or pyramid, unless this has been done. */
+/* Computes the lines of the edges and of the quads' diagonals of a hex, wedge or pyramid, unless this has been done. */
 static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, const kernel_frame *f,
                                                               const kernel_tile *tile)
 {

@@ -57,7 +57,7 @@ SIMD_INLINE void kernel_cell_subtract_isovalue(kernel_cell *c, double isovalue)
 }
 
 /* Reads the colour field at a cell's vertices and converts it to the domain of its transfer function. Returns the
- * mean. */
+ * average of the converted values. */
 SIMD_INLINE double kernel_read_colour_values(const kernel_surface *s, int part, uint32_t cell, const int64_t *vertices,
                                              int count, float *out)
 {

@@ -48,10 +48,10 @@ static __attribute__((noinline, cold)) vf kernel_decide_edge_ties(vf ax, vf ay, 
     return e;
 }
 
-/* Returns the value at an interval's end. v_in, v_out: values minus the isovalue where the ray enters and leaves a
- * cell. If the surface consists of faces of cells (is_of_faces of render.h) and a ray meets such a face only in an
- * edge, both are 0. Then the value at the end is set to slightly below 0, as inside the cell, so that the ray has a
- * crossing. */
+/* Returns v_out, changed for some rays. v_in, v_out: values minus the isovalue where the ray enters and leaves a cell.
+ * If the surface consists of faces of cells (is_of_faces of render.h) and a ray meets such a face only in an edge, v_in
+ * and v_out are both 0. For such a ray a number slightly below 0, as inside the cell, is returned, so that the ray has
+ * a crossing. */
 SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
 {
     if (!is_of_faces) return v_out;

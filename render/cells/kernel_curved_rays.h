@@ -37,9 +37,9 @@ SIMD_INLINE vi kernel_curved_edge_sign(const vf x[8], const vf y[8], int a, int 
 }
 
 /* Returns the rays that cross exactly one of a quad's two triangles. Unlike a test of the four edges, this is right
- * even if the quad does not look convex along the ray; the result does not depend on the diagonal along which the quad
- * is split. around: edge functions of the quad's edges in cyclic order; diagonal: that from corner 0 to corner 2; of
- * both only the sign bits are used. Rays that may cross the quad's patch twice are added to *alone. */
+ * even if the quad is not convex in the projection along the ray. The result does not depend on the diagonal along
+ * which the quad is split. around: edge functions of the quad's edges in cyclic order; diagonal: that from corner 0 to
+ * corner 2; of both only the sign bits are used. Rays that may cross the quad's patch twice are added to *alone. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], const signed char *loop,
                                                 const vi around[4], vi diagonal, vm rays, vm *alone)
 {
@@ -52,7 +52,8 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
 /* Finds the rays that cross exactly two faces of their cells, each once (*two), and the indices of these faces in the
  * cell (face). A ray crosses a face if all edge functions of the face have the same sign. *alone: rays that must be
  * traced cell by cell. Rays in neither mask miss their cells. at: x, y and z of the cells' vertices, by vertex and
- * lane. nonconvex: per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
+ * lane. nonconvex: per ray, a mask of its cell's faces with the bits of the quads that may be nonconvex in the
+ * projection along the ray; NULL: no quad is. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, vm *two, vm *alone, vi face[2], int type)
 {

@@ -32,7 +32,8 @@ SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, v
 }
 
 /* Transforms one vertex per lane, for one half of the lanes, from world coordinates into tile space, in double. Returns
- * the vertices' distances from the eye or, if the camera is orthographic, the scale of the job's space. */
+ * the vertices' depths from the eye's plane in scaled units or, if the camera is orthographic, the scale of the job's
+ * space. */
 SIMD_INLINE kernel_f64 kernel_lanes_transform_half(const kernel_frame *f, const kernel_tile *tile,
                                                    const kernel_f64 (*world)[2], int half, kernel_f64 out[3])
 {
@@ -90,8 +91,8 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* Returns the magnitude above which the sign of the edge function of two vertices is certain. size_a, size_b:
- * kernel_lanes_size() of the vertices. */
+/* Returns the magnitude above which the sign of an edge's affine edge function is certain (kernel_line.bound). size_a,
+ * size_b: kernel_lanes_size() of the vertices. */
 SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);

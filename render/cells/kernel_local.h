@@ -12,10 +12,10 @@
  *              centroid, κ from the middle
  *     pyramid  α, β from the axis; k is 0     |α|, |β| <= k / 2, k <= 1
  *              at the apex
- * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 (KERNEL_LOCAL_BENT) at every corner; other cells
- * are not processed in lanes. The norm is convex along each coordinate, so it is nowhere larger in the cell, and so r
- * -> r + n(r) maps no two points of the cell to the same point. The choice of the origin of the coordinates does not
- * affect the position of a point. */
+ * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 (KERNEL_LOCAL_BENT, KERNEL_LOCAL_BENT_MOST) at
+ * every corner; other cells are not processed in lanes. The norm is convex along each coordinate, so it is nowhere
+ * larger in the cell, and so r -> r + n(r) maps no two points of the cell to the same point. Reference coordinates are
+ * counted from the middle here and from a corner in kernel_map.h; both describe the same points. */
 #ifndef RENDER_KERNEL_LOCAL_H
 #define RENDER_KERNEL_LOCAL_H
 
@@ -285,13 +285,15 @@ SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const 
 
 /* ---- points ---- */
 
-/* Points, one per lane, each with the data of its own cell. */
+/* Points, one per lane, each in its own cell. y: affine approximation of the point's reference coordinates r;
+ * nonlinear_part: the coefficients of the cell's n. */
 typedef struct kernel_local_points {
     vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
-    /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    /* The nonlinear terms of the map (products of the reference coordinates) at the current r, and their
+     * derivatives. */
     vf term[KERNEL_NONLINEAR_TERMS], slopes[KERNEL_NONLINEAR_TERMS][3];
-    /* column: columns of the adjugate of the matrix of derivatives of r + n(r); det: 1 divided by the determinant of
-     * that matrix */
+    /* column: columns of the adjugate of the matrix of derivatives of r + n(r); det: the reciprocal of this matrix's
+     * determinant */
     vf column[3][3], det;
 } kernel_local_points;
 

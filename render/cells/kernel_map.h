@@ -6,8 +6,7 @@
  * with m = r s. The trilinear hex has all terms; in the wedge c4 and c7 are 0. The pyramid is the collapsed hex, whose
  * map is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 +
  * k c3 + c4 m with m = a b / k, which is linear except for the last term; that term vanishes if the base is a
- * parallelogram.
- * So Newton's method meets no singularity there: m is bounded by k.
+ * parallelogram. In these coordinates Newton's method meets no singularity at the apex, because m is bounded by k.
  *
  * A cell is called folded if its map is not one-to-one, so that a point may have several reference coordinates. */
 #ifndef RENDER_KERNEL_MAP_H
@@ -86,8 +85,8 @@ SIMD_INLINE void kernel_f64_fit(int type, kernel_f64 c[8], const kernel_f64 v[8]
     KERNEL_FIT(type, c, v);
 }
 
-/* The product m in the map's polynomial (the top of this file), and its derivatives along the three reference
- * coordinates. */
+/* The product m = r s, or a b / k in a pyramid, in the map's polynomial (see the top of this file), and its derivatives
+ * along the three reference coordinates. */
 typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
@@ -385,8 +384,8 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
     for (int a = 0; a < 3; a++) r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
 }
 
-/* Largest difference, by rounding, between the value computed on a face and the field of the cell at the same point, if
- * the largest vertex value is near 1. */
+/* Upper bound of the difference, caused by rounding, between the value computed on a face and the field of the cell at
+ * the same point, if the largest magnitude of a vertex value is near 1. */
 #define KERNEL_FACE_BAND 1e-6f
 
 /* Bounds of rays in tile space. spread: their directions are (x, y, 1) with |x| and |y| up to this. */

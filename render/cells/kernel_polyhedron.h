@@ -17,9 +17,10 @@
  *
  * If the cell is star-shaped from its centre, the tets fill it exactly once, and the field at a sheet is the sheet's
  * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum over the tets
- * that contain it, each with its sign. (A point inside is contained in one more positive than negative tet. At a sheet
- * with its two tets on different sides the sum does not jump; a sheet with both on one side adds or removes f - f = 0.)
- * That sum is computed at sheets, from each tet's interval [t_in, t_out).
+ * that contain it, each with its sign. (A point inside the cell is contained in one more positive than negative tet. If
+ * the two tets of a sheet are on different sides of it, the ray leaves one and enters the other, and the sum does not
+ * jump. If both are on one side, they have opposite signs, and the ray enters or leaves both: the sum changes by f - f
+ * = 0.) That sum is computed at sheets, from each tet's interval [t_in, t_out).
  *
  * On which side of an isovalue a ray enters and leaves is decided by the values on the faces themselves
  * (kernel_surface.h). These are linear on triangles, bilinear on quads, as in a hex on the other side, and linear on
@@ -57,15 +58,14 @@ typedef struct kernel_poly_crossings {
     bool has_colour; /* whether colour values w are computed too */
     vf *x, *y;       /* x and y, relative to the rays, of the projected vertices and centre */
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
-    kernel_triangle_crossings
-        /* crossings of surface triangles, by the index of the triangle; only those of triangles that are listed in
-         * `met` are set */
-        *facets;
+    /* crossings of surface triangles, by the index of the triangle; only those of triangles that are listed in `met`
+     * are set */
+    kernel_triangle_crossings *facets;
     vm *unassigned; /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but do not cross its bilinear patch, or cross the patch twice but
      * neither triangle */
     vm uneven;
-    int *met;
+    int *met; /* indices of the surface triangles that some ray crosses, or whose quad's patch it crosses */
     int met_count;
     /* crossings of sheets, by the index of the edge; only those listed in met_sheets are set */
     kernel_triangle_crossings *sheets;
@@ -460,9 +460,10 @@ static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, 
     }
 }
 
-/* Returns the rays whose crossing of the sheet lies in the current interval: between the crossings of the surface
- * triangles at its ends, and between those of the faces. Sheets beyond the triangles belong to tets that extend out of
- * the cell, and are not part of its field. */
+/* Returns the rays whose crossing of the sheet lies in the current interval. It must lie between the ray's crossings of
+ * the two surface triangles at the interval's ends, and also between its crossings of the two faces to which these
+ * triangles belong. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its
+ * field. */
 SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
     const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));

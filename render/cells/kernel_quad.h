@@ -329,8 +329,8 @@ SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
-/* Returns those of the rays that may meet the patch twice if the signs of a1 and b1 are considered too. rays: the
- * result of kernel_quad_sides_allow_two_points(). */
+/* Returns those of the rays that may meet the patch twice if the signs of a1 and b1 (see the top of this file) are
+ * considered too. rays: the result of kernel_quad_sides_allow_two_points(). */
 SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -351,9 +351,9 @@ SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
     return vm_xor(half0, half1);
 }
 
-/* Returns those of the rays that may meet a quad's patch twice if the discriminant is considered too. across, other:
- * cross products of corners 0 and 2, and of corners 3 and 1. A ray is excluded only if the discriminant is negative by
- * more than its rounding in float32, which is below a millionth of its terms. */
+/* Returns those of the rays that may meet a quad's patch twice if the discriminant D (see the top of this file) is
+ * considered too. across, other: cross products of corners 0 and 2, and of corners 3 and 1. A ray is excluded only if
+ * the discriminant is negative by more than its rounding in float32, which is below a millionth of its terms. */
 static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminant(const vf x[8], const vf y[8],
                                                                                   const signed char *loop, vm rays,
                                                                                   vf across, vf other)
@@ -417,10 +417,10 @@ SIMD_INLINE int kernel_compute_quad_points(const kernel_quad *q, vm once, vm twi
  * d in each coordinate of both edges: 4 d k + 8 d d. The products that are computed here have magnitudes that sum to
  * at most k k, and each is rounded at most 10 times: 6e-7 k k. */
 
-/* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges as seen by the middle ray
- * of the box; square: the squares of their lengths in space; spread: half width plus half height of the range of the
- * rays' slopes; margin: upper bound of the rounding error of a cross product of two edges; sides: the quad's edges in
- * cyclic order, and whether each is reversed. */
+/* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges, projected along the
+ * middle ray of the box; square: the squares of the edges' lengths in space, not projected; spread: half the width plus
+ * half the height of the range of the rays' slopes; margin: upper bound of the rounding error of a cross product of two
+ * edges; sides: the quad's edges in cyclic order, and whether each is reversed. */
 SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf spread, vf margin,
                                      const signed char (*sides)[2])
 {

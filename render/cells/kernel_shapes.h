@@ -92,9 +92,9 @@ SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int co
     return vf_from_vi(vi_set(bits) >> corner & 1);
 }
 
-/* Returns the rays for which one of the two faces that the ray crosses is a quad. face: index of this face in the cell;
- * n: 0 if it is the smaller of the ray's two indices, otherwise 1. In a wedge, faces 0 and 1 are triangles. In a
- * pyramid, face 0 is the only quad, so that it never has the larger index. */
+/* Each ray crosses two faces of its cell. Returns the rays for which one of these two faces is a quad. face: index of
+ * that face in the cell; n: 0 if it is the face with the smaller index, 1 if it is the other. In a wedge, faces 0 and 1
+ * are triangles. In a pyramid, face 0 is the only quad, so that it never has the larger index. */
 SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
     const vf number = vf_from_vi(face);

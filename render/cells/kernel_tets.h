@@ -1,6 +1,6 @@
-/* Computes the interval of rays in tets. A ray crosses two or none of a tet's four faces (kernel_cell.h). The same
- * source is compiled for rays that each have a tet of their own and for rays that share one tet: kernel_tets.is_uniform
- * is a compile-time constant wherever these functions are inlined. */
+/* Computes the interval of each ray inside its tet. A ray crosses two or none of a tet's four faces (kernel_cell.h).
+ * The same source is compiled for rays that each have a tet of their own and for rays that share one tet:
+ * kernel_tets.is_uniform is a compile-time constant wherever these functions are inlined. */
 #ifndef RENDER_KERNEL_TETS_H
 #define RENDER_KERNEL_TETS_H
 

@@ -1,9 +1,9 @@
 /* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
- * their triangular faces. The operations are those of kernel_cell_subtract_isovalue(), kernel_transform_in_tile(),
- * kernel_cell_order() and kernel_cell_compute_lines(), so the results are bit-identical. Vertices are put in canonical
- * order first (kernel_cell_canonical_order()), so that all data are stored in that order. Computations in double are
- * done for one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a constant, so that loops
- * have constant lengths. */
+ * their triangular faces. The operations are those of the functions for single cells, kernel_cell_subtract_isovalue(),
+ * kernel_transform_in_tile(), kernel_cell_order() and kernel_cell_compute_lines(), so the results are bit-identical.
+ * Vertices are put in canonical order first (kernel_cell_canonical_order()), so that all data are stored in that order.
+ * Computations in double are done for one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a
+ * constant, so that loops have constant lengths. */
 #ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
 #define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
@@ -43,15 +43,16 @@ typedef struct kernel_transformed_curved {
     /* for each triangle, the least sum of weights at which its crossings are accurate (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
-    /* The following two members are used only for segments of volumes (kernel_local_crossings.h). Per cell, a bit for
-     * each quad that may not look convex on some of the cell's pixels (kernel_curved_nonconvex_quads()). */
+    /* The following two members are used only for segments of volumes (kernel_local_crossings.h). nonconvex: per cell,
+     * the bits of a mask of the quads that may be nonconvex in the projection along some ray through the cell's pixels
+     * (kernel_curved_nonconvex_quads()). */
     float nonconvex[SIMD_WIDTH];
     /* for vectors of 16 lanes: a copy of the data, cell by cell instead of lane by lane, in three rows of 16 numbers: x
      * and y by vertex; z and the field by vertex; `corners` by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which copies one lane's cell. world:
-     * coordinates by vertex and axis, in two halves of the lanes; rank: rank in the order of coordinates; vertex: index
-     * in kernel_arrays. */
+     * coordinates by vertex and axis, in two halves of the lanes; rank: rank of each vertex in the order of
+     * coordinates; vertex: index of each vertex in the mesh. */
     kernel_f64 world[8][3][2];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
@@ -457,8 +458,8 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
 }
 
 /* Fetches cells of one type, puts their vertices in canonical order, and transforms them. vertices: indices in the
- * mesh, by vertex and lane. Returns the lanes whose cell has an edge of length zero. kernel_transformed_faces() must be
- * called for the data of faces. */
+ * mesh, by vertex and lane. Returns the lanes whose cell has an edge of length zero. The data of faces are not set;
+ * kernel_transformed_faces() computes them. */
 static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[8][SIMD_WIDTH],

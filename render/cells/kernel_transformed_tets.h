@@ -1,7 +1,7 @@
-/* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of
- * kernel_cell_move_to_tile_space() and kernel_cell_order(), so the results are bit-identical.
- * Vertices are sorted by coordinates first, so that all data are stored in that order. Computations in double are done
- * for one half of the lanes (kernel_wide.h) after the other. */
+/* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of the
+ * functions for single cells, kernel_cell_move_to_tile_space() and kernel_cell_order(), so the results are
+ * bit-identical. Vertices are sorted by coordinates first, so that all data are stored in that order. Computations in
+ * double are done for one half of the lanes (kernel_wide.h) after the other. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
 #define RENDER_KERNEL_TRANSFORMED_TETS_H
 
@@ -19,9 +19,9 @@
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
  * members of kernel_line, by edge; doubt: the largest bound of the tet's edge functions; least: for each face, the
- * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices in kernel_arrays. The
- * caller sets f, the values as the layer needs them, and colours, the values of the colour field, if the layer has one.
- */
+ * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices of the vertices in the
+ * mesh. The caller sets f, the vertex values as the layer needs them (kernel_cell.f), and, if the layer has a colour
+ * field, `colours`, the values of that field. */
 typedef struct kernel_transformed_tets {
     /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
     kernel_f64 world[4][3][2], values[4][2];
@@ -61,8 +61,8 @@ SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, cons
     }
 }
 
-/* Computes the edge functions. Also computes, for each face, the least sum of weights at which a crossing of the face
- * is accurate enough (kernel_least_weight()). */
+/* Computes the lines of the tets' edges (c, cu, cv and bound). Also computes, for each face, the least sum of weights
+ * at which a crossing of the face is accurate enough (kernel_least_weight()). */
 SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const kernel_frame *f, const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];

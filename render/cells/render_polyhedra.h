@@ -39,7 +39,7 @@ typedef struct polyhedron {
      * vertex values of the colour field, in its transfer function's domain */
     float *f, *g;
     double scale; /* factor by which the differences from the isovalue are multiplied in f */
-    /* maximum rates, per unit of depth, at which values decrease and increase along the tile's rays */
+    /* upper bounds of the rates, per unit of t, at which the field falls and rises along the tile's rays in any tet */
     double fall, rise;
     /* members of kernel_line (kernel_cell.h): for the edges, then for the edges from each vertex to the centre */
     float (*lines)[4];
