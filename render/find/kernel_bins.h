@@ -1,5 +1,5 @@
-/* Converts candidates to the form in which the bin of one tile stores them, and sorts a bin by depth (kernel_types.h
- * defines candidates and bins). */
+/* Converts candidates (cells that may be visible) to the form in which a tile's bin stores them, and sorts a tile's bin
+ * by depth (kernel_types.h). */
 #ifndef RENDER_KERNEL_BINS_H
 #define RENDER_KERNEL_BINS_H
 

@@ -58,8 +58,8 @@ typedef struct kernel_curved_lanes {
 } kernel_curved_lanes;
 
 /* Returns the lanes whose cells' maps are not folded. terms: the polynomial coefficients of the three coordinates
- * (kernel_local.h); inverse: the inverse of the matrix of their linear terms. The square of the norm must be below 0.9
- * instead of 1, which leaves a margin far larger than all rounding errors. */
+ * (kernel_local.h); inverse: the inverse of the matrix of their linear terms. The square of the Frobenius norm (see the
+ * top of this file) must be below 0.9 instead of 1, which leaves a margin far larger than all rounding errors. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
 {
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
@@ -71,8 +71,9 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], cons
 }
 
 /* Computes the members level and thickness, which define the slab that contains the isosurface. |f| is at most about 1.
- * With r the rounding error of one coordinate, positions have an error of at most r, and their mean has one of at most
- * 8 r. Lanes in which the cell's volume is near float32's minimum are removed from fitting_lanes. */
+ * Let r be the rounding error of one coordinate. Each coordinate of a vertex has an error of at most r, and that of the
+ * average of the vertices (terms[a][0]) has an error of at most 8 r. Lanes in which the cell's volume is near float32's
+ * minimum are removed from fitting_lanes. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
 {
     const int count = grid_type_vertices(type);
@@ -111,8 +112,9 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
     KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
 }
 
-/* Computes the bounds of the part of the cell's convex hull in the slab. Its corners are among the vertices that lie in
- * the slab and the points at which lines between two vertices cross the slab's two planes. */
+/* Computes the bounds, in the picture and in depth, of that part of the cell's convex hull that lies in the slab. The
+ * part's corners are among the vertices that lie in the slab and the points at which lines between two vertices cross
+ * the slab's two planes. */
 static __attribute__((noinline)) void
 kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
@@ -133,8 +135,8 @@ kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lane
     }
 }
 
-/* Computes the bounds of the points on the edges of tets at which the field is the isovalue. negative: for each vertex
- * the lanes in which its value is below the isovalue, compared exactly. */
+/* Computes the bounds, in the picture and in depth, of the points on each tet's edges at which the field is the
+ * isovalue. negative: for each vertex the lanes in which its value is below the isovalue, compared exactly. */
 SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l,
                                               const vm negative[4], kernel_view_bounds *e)
 {

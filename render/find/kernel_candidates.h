@@ -31,7 +31,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* ---- cells of volumes; their pixels are those of the bounding box of their vertices ---- */
+/* ---- cells of volumes; each covers the pixels of the bounding box of its vertices ---- */
 
 /* Reads one cell's positions and values from the mesh into s->cell. */
 SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)

@@ -121,8 +121,9 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
 
 /* ---- cells in lanes ---- */
 
-/* Bounds of what is visible of each lane's cell: near, far: depth from the eye in scaled units; left, right, top,
- * bottom: pixels, counted from the ray along the camera's axis. */
+/* Bounds of the part of each lane's cell that may be visible. near, far: depths from the eye's plane, in scaled units;
+ * left, right, top, bottom: columns and rows of pixels, as real numbers, counted from the ray along the camera's
+ * axis. */
 typedef struct kernel_view_bounds {
     vf near, far, left, right, top, bottom;
 } kernel_view_bounds;
@@ -178,9 +179,9 @@ SIMD_INLINE kernel_view_bounds kernel_view_bounds_empty(void)
 }
 
 /* Computes the first and the last column (or row) of pixels between each lane's bounds low and high, clipped to the
- * range from ends[0] to ends[1]. zero: the column at which the bounds' coordinate is 0; error_bound: error of the
- * bounds, in pixels. The bounds are widened by error_bound, by 1/100 pixel and by 3e-5 of their magnitude and that of
- * `zero`, so that rays that hit the cell only by rounding are included. Returns the lanes that contain a pixel. */
+ * range from ends[0] to ends[1]. zero: the column (or row) at which `low` and `high` are 0; error_bound: error of `low`
+ * and `high`, in pixels. The bounds are widened by error_bound, by 1/100 pixel and by 3e-5 of their magnitude and that
+ * of `zero`, so that rays that hit the cell only by rounding are included. Returns the lanes that contain a pixel. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
                                   vf *last)
 {

@@ -21,13 +21,14 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* Cells count as small, so that tiles traverse the trees themselves, if there are more than this many per pixel of the
- * trees' bounding boxes in the picture. SMALL_CELLS: for volumes. SMALL_CROSSED: for surfaces, of which only the cells
- * in leaves that isovalues may cross are counted (docs/development/decisions/find.md). SAMPLES: number of tree nodes
- * from which the number of these cells is estimated. */
+/* SMALL_CELLS and SMALL_CROSSED are limits for the number of cells per pixel that the trees' bounding boxes cover in
+ * the picture. If there are more cells, they count as small, and tiles traverse the trees themselves. SMALL_CELLS: for
+ * volumes. SMALL_CROSSED: for surfaces; only cells in tree leaves whose range of values contains an isovalue are
+ * counted (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which the number of these cells is
+ * estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
-/* ---- cells ---------------------------------------------------------------------------------------------------- */
+/* ---- lists of candidates -------------------------------------------------------------------------------------- */
 
 /* Adds a chunk of memory to the list. Returns false, and marks the list as full, if the maximum number of candidates is
  * reached or memory runs out. A full list stays full, because candidates are missing from it. */
@@ -61,7 +62,7 @@ static void free_list(kernel_candidate_list *list)
     }
 }
 
-/* ---- tiles ---------------------------------------------------------------------------------------------------- */
+/* ---- bins of the candidates of each tile ---------------------------------------------------------------------- */
 
 /* The candidates that one thread has found, sorted by tile: those of a tile are items[starts[tile]] to
  * items[starts[tile + 1] - 1]. The bins of all threads that have searched are one array; `next` is NULL in the last. */
@@ -236,8 +237,9 @@ static bool measure_parts_in_picture(const kernel_frame *f, const mmbvh_ranges *
     return true;
 }
 
-/* Returns whether the volume's cells are so small that listing them costs more than it saves. A listed cell is fetched
- * twice, once for its pixels and once for its samples; tiles that traverse the trees themselves fetch it once. */
+/* Returns whether the volume's cells are so small that listing them as candidates costs more time than it saves. A
+ * listed cell is fetched twice, once for its pixels and once for its samples; tiles that traverse the trees themselves
+ * fetch it once. */
 static bool volume_cells_are_small(const kernel_frame *f)
 {
     double cells, pixels, all[2][2];
@@ -295,8 +297,9 @@ bool render_surfaces_are_small(const kernel_frame *f)
     return crossed > SMALL_CROSSED * pixels;
 }
 
-/* The rectangle is extended by a margin that covers the errors of rays and tree bounds for which kernel_tree_planes()
- * allows, and the half pixel by which a pixel extends beyond its centre. */
+/* The rectangle of pixels in frame->cover contains the projections of all trees' bounding boxes. It is extended by a
+ * margin that covers the errors of rays and tree bounds for which kernel_tree_planes() allows, and the half pixel by
+ * which a pixel extends beyond its centre. */
 void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -317,8 +320,9 @@ void render_trees_cover(kernel_frame *f)
 
 /* ---- the search ----------------------------------------------------------------------------------------------- */
 
-/* Searches all subtrees in parallel. As soon as no subtree is left, each thread sorts its own candidates by tile (at
- * most `most`), without waiting for the other threads. */
+/* Searches all subtrees in parallel. As soon as no subtree is left, each thread sorts its own candidates by tile,
+ * without waiting for the other threads. most: maximum number of candidates that a thread may store in its bins; a
+ * candidate counts once for each of its tiles. */
 static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count, struct kernel_bins *bins,
                 int64_t most, kernel_thread *thread_of, int threads)
 {
@@ -358,8 +362,8 @@ static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound,
     return bins;
 }
 
-/* Returns whether every thread has sorted all of its candidates into its bins, and their number on all threads is at
- * most `most`. */
+/* Returns whether every thread has sorted all of its candidates into its bins, and the bins of all threads together
+ * have at most `most` candidates. */
 static bool is_complete(const struct kernel_bins *bins, int64_t tiles, int64_t most)
 {
     int64_t count = 0;
@@ -370,7 +374,8 @@ static bool is_complete(const struct kernel_bins *bins, int64_t tiles, int64_t m
     return count <= most;
 }
 
-/* Returns the binned candidates of all surfaces, or of the volume; NULL if there are too many or memory runs out. */
+/* Returns the binned candidates of all surfaces or, if is_volume is set, of the volume; NULL if there are too many or
+ * memory runs out. */
 static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads)
 {
     const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;

@@ -5,8 +5,8 @@
 
 #include "kernel_types.h"
 
-/* Returns whether all surfaces are opaque and have so many cells per pixel that tiles should traverse the trees
- * themselves. */
+/* Returns whether tiles should traverse the trees themselves: whether all surfaces are opaque and their cells are so
+ * small that there are several per pixel. */
 bool render_surfaces_are_small(const kernel_frame *frame);
 
 /* Finds the candidates of all surfaces and stores them in frame->candidates, which render_candidates_free() frees.
