@@ -93,7 +93,7 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->prefetched[3].stride = p->is_by_cell ? p->prefetched[0].stride : values.stride;
 }
 
-/* ---- cells ---- */
+/* ---- vertex indices of cells ---- */
 
 SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
 {
@@ -158,7 +158,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn_lanes(const kernel_arrays *p, const uin
     return lanes;
 }
 
-/* ---- numbers ---- */
+/* ---- coordinates and values ---- */
 
 /* Computes the coordinates along one axis of vertices of a uniform or rectilinear lattice, one vertex per lane. The
  * index along the axis is computed from the vertex index as in grid_index_along(). */

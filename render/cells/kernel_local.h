@@ -156,7 +156,7 @@ SIMD_INLINE vf kernel_local_border_distance(int type, const vf r[3])
     return vf_min(vf_min(vf_min(r[0], r[1]), r[2]) + 0.25f, 0.25f - ((r[0] + r[1]) + r[2]));
 }
 
-/* ---- cells ---- */
+/* ---- maps of cells ---- */
 
 /* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
 SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
@@ -283,7 +283,7 @@ SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const 
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
 
-/* ---- points ---- */
+/* ---- reference coordinates of points ---- */
 
 /* Points, one per lane, each in its own cell. y: affine approximation of the point's reference coordinates r;
  * nonlinear_part: the coefficients of the cell's n. */
