@@ -26,7 +26,8 @@ typedef struct colour_point {
  * spaced, it is 256 or a few more, so that each point is an entry. Otherwise it is 1025; a step, given by two points at
  * one position, is then spread over the distance between two entries. */
 int colour_table_entries(const colour_point *points, int count);
-/* Fills the table (entries × 3, linear light), from the first point to the last. */
+/* Fills a table of `entries` evenly spaced colours (3 floats each, linear light) that are interpolated between the
+ * points. Its first entry has the colour of the first point, its last entry that of the last point. */
 void colour_fill_table(const colour_point *points, int count, colour_space space, float *table, int entries);
 
 #endif

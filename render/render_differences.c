@@ -31,7 +31,7 @@ void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_I
     for (int i = 0; i < job->surface_count; i++) render_surface_range(job, i, ranges[i]);
 }
 
-/* ---- selection of ranks ----------------------------------------------------------------------------------------- */
+/* ---- ranks whose cells a hit needs ------------------------------------------------------------------------------ */
 
 static bool is_by_differences(const render_surface_layer *layer)
 {
@@ -68,7 +68,7 @@ bool render_differences_meet(const render_job *job, const render_pending_hit *hi
     return beside <= 1 && beyond == 0;
 }
 
-/* ---- order ----------------------------------------------------------------------------------------------------- */
+/* ---- sorting hits by tile and block ---------------------------------------------------------------------------- */
 
 /* Returns a number by which hits are sorted: by tile, block, isovalue and pixel in the block. Its last bits are the
  * index of the hit among those that are sorted together. */

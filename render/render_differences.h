@@ -1,4 +1,5 @@
-/* Computes normals by central differences of the field if some of the samples around a hit lie in cells of other ranks.
+/* Computes a hit's normal by central differences of the field if some of the six samples around the hit lie in cells of
+ * other MPI ranks.
  *
  * First a frame is traced whose job has a list of pending hits (render_job.waiting); its hits with normals by
  * differences are added to that list. The field is then sampled at six points around each hit, by this rank and by
@@ -21,7 +22,8 @@ render_box render_differences_box(const render_job *job);
 /* Returns whether the job has surfaces whose hits may need samples of other ranks. */
 bool render_has_differences(const render_job *job);
 
-/* Computes the range of each surface's field on this rank; the ranges over all ranks are reduced from these. */
+/* Computes the range of values of each surface's field on this rank. The caller reduces the ranges of all ranks to
+ * those over all ranks (render_job.waiting_ranges). */
 void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
 
 /* Sorts the hits by tile and block, so that hits of neighbouring pixels are adjacent, which only matters for speed.

@@ -1,8 +1,8 @@
 /* To fold fragments means to blend them into one, in the fixed order of fragment_fold.h: a pixel's ray is cut into
  * intervals of t, which are halved repeatedly, and fragments are folded half by half. A run is a sequence of a pixel's
  * samples or segments that follow each other without a gap and without a surface in between. No other rank has
- * fragments between the begin and the end of a run. So the fragments of each interval, or half of one, that lies
- * within a run can be folded. If only this rank has cells (job->is_alone), all fragments between two surfaces can be
+ * fragments between the begin and the end of a run. So if an interval, or a half of one, lies within a run, its
+ * fragments can be folded. If only this rank has cells (job->is_alone), all fragments between two surfaces can be
  * folded. */
 #include "render_fold.h"
 

@@ -19,11 +19,11 @@ typedef struct render_folding {
 
 /* Folds a tile's list of fragments, and replaces it by the result. In the list, each sample or segment of the volume is
  * one fragment. fragment_fold.h divides a ray into intervals and halves of intervals. If this rank certainly has all
- * volume fragments of a pixel in one of these, they are blended into one fragment.
+ * volume fragments that a pixel has in such an interval or half, they are blended into one fragment.
  *
- * On input, a fragment of the kind FRAGMENT_EARLY may be preceded by a surface or by fragments of other ranks. A
- * fragment of the kind FRAGMENT_LATE is an extra fragment that marks a ray on which cells overlap. Returns false if
- * memory ran out. */
+ * On input, the kind FRAGMENT_EARLY marks a fragment in front of which there may be a surface or fragments of other
+ * ranks. A fragment of the kind FRAGMENT_LATE is an extra fragment that marks a ray on which cells overlap. Returns
+ * false if memory ran out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list);
 
 void render_folding_free(render_folding *folding);

@@ -54,8 +54,8 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
     m->prefetched_count = 0;
 }
 
-/* Traces the tile's transparent surfaces if `transparent` is set, otherwise its opaque ones, which must be traced
- * first. */
+/* Traces the surfaces in the tile's candidates q: the transparent ones if `transparent` is set, otherwise the opaque
+ * ones, which must be traced first. */
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_bin *q,
                                                                    bool transparent)
 {

@@ -1,6 +1,6 @@
 /* Traces the rays of hits towards lights and into the hemisphere above the surface, and lights the hits. First all rays
- * are tested in tree space (kernel_occluders.h). Rays that these tests leave undecided for some cell are transformed
- * into a tile space of their own and tested exactly in that cell (kernel_bundle.h). */
+ * are tested in tree space (kernel_occluders.h). If these tests cannot decide whether a cell blocks a ray, the ray is
+ * transformed into a tile space of its own and tested exactly in that cell (kernel_bundle.h). */
 #include "render_light.h"
 
 #include <math.h>
@@ -149,7 +149,7 @@ static void tracer_set_tile_space(tracer *t, const double eye[3], const double (
         for (int k = 0; k < 3; k++) t->frame.scaled_axes[a][k] = axes[a][k] * t->moved_job.space.scale;
 }
 
-/* Sets up the bundle with the rays of a hit's hemisphere. */
+/* Fills the bundle with the rays of a hit's hemisphere, and sets the tile space to theirs. */
 static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
@@ -176,7 +176,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
     b->count = o->samples;
 }
 
-/* Sets up the bundle with a hit's ray to a light. */
+/* Fills the bundle with a hit's ray to a light, and sets the tile space to that of the ray. */
 static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const render_space *space = &t->job->space;
@@ -216,8 +216,8 @@ static void test_cell(tracer *t, int32_t occluder)
     t->of->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Occluder index that marks an undecided ray-cell pair as tested: the cell has been tested with all rays for which it
- * was undecided. */
+/* Replaces the occluder's index in an undecided ray-cell pair when that cell has been tested with all rays of the hit
+ * for which it was undecided. */
 enum { TESTED = -1 };
 
 /* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided ray-cell pairs, and clears

@@ -6,8 +6,8 @@
  * and that it faces, and a set of rays into the hemisphere above it. Each rank tests which of these rays its opaque
  * surfaces block; a ray stays open if those of no rank block it. Whether a cell blocks a ray depends on the ray and the
  * cell alone, so the picture does not depend on the partition. Transparent surfaces and volumes block nothing;
- * transparent surfaces are lit like opaque ones. A surface whose material is purely ambient takes no light from lights:
- * it gets its final colours in the first frame, and its hits have no rays.
+ * transparent surfaces are lit like opaque ones. A surface whose material is purely ambient is not lit by lights: it
+ * gets its final colours in the first frame, and its hits have no rays.
  *
  * Where rays begin: a hit deviates from its surface by the rounding of its depth and of the numbers from which the
  * depth was computed, by at most 1e-6 in the space's scaled units (twice KERNEL_WEIGHT_ERROR, and t's own rounding).
@@ -26,7 +26,8 @@ enum { RENDER_MAX_SAMPLES = 64 };
 /* Height above its surface at which a hit's rays begin, in scaled units, in which the size of a scene is about 1. */
 #define RENDER_LIFT 4e-6
 
-/* A hit on a surface, taken from an unlit fragment: pixel, depth, and encoded normal. */
+/* A hit on a surface, taken from an unlit fragment: its pixel, its ray parameter t, and its unit normal in octahedral
+ * encoding (hit_normal()). */
 typedef struct render_hit {
     uint32_t pixel;
     float t, normal[2];

@@ -60,9 +60,9 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double slope = high > low ? 1 / (high - low) : 1;
-    /* Values below low / 2 are replaced by low / 2 before logarithms are taken. The position of low / 2 in the colour
-     * table is below that of `low` by more than RENDER_END, so that the replaced values still count as below the
-     * range. */
+    /* On a logarithmic scale, values below low / 2 are replaced by low / 2 before logarithms are taken. The position of
+     * low / 2 in the colour table is below that of `low` by more than RENDER_END, so that the replaced values still
+     * count as below the range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
     out->scale = t->scale;

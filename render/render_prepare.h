@@ -7,7 +7,8 @@
 #include "kernel_types.h"
 #include "render.h"
 
-/* Checks the job and fills *frame, which must be freed with render_unprepare() if this succeeds. */
+/* Checks the job and computes the constants of its frame, which are stored in *frame. If this succeeds, *frame must be
+ * freed with render_unprepare(). */
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);
 
 /* Fills *frame as render_prepare() does, but without the job's volumes. *surfaces becomes a copy of the job without
