@@ -5,7 +5,7 @@
  *     kind          number that a fragment has for its isovalue: the surface's first_kind plus the isovalue's index
  *     tied hit      hit of an opaque surface with exactly the same depth as the nearest hit of its ray
  *     reach         distance from a hit to the points at which central differences sample the field, in scaled units
- *     pending hit   hit whose normal needs samples of other ranks' cells, so that it is lit after the frame is traced
+ *     pending hit   hit whose normal needs samples of the field in other ranks' cells; it is lit after tracing
  */
 #ifndef RENDER_KERNEL_ACCEPT_H
 #define RENDER_KERNEL_ACCEPT_H
@@ -29,9 +29,11 @@
  *
  * Normals from vertices are computed for visible hits only. While a nearer hit may still be found, a hit stores its
  * cell and, in place of the normal, its reference coordinates in that cell. When all cells have been traced, the rays
- * are processed one by one, and consecutive rays that hit the same cell share its coefficients. */
+ * are processed one by one, and consecutive rays that hit the same cell share the coefficients by which gradients are
+ * interpolated in it. */
 
-/* Computes the gradient that the caller gives at a vertex, rotated into camera axes; 0 if the caller gives none. */
+/* Reads the gradient that the job gives at a vertex (render_vertex_gradients), and rotates it into camera axes. It is 0
+ * if the job gives none there. */
 SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
                                         double out[3])
 {
@@ -131,8 +133,9 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
     out[2] = (double)t;
 }
 
-/* Replaces the reference coordinates that are stored in `normal` by normals, in camera axes. A hit whose mesh part is
- * -1 (a hit in a polyhedron) already has its normal. */
+/* Computes the normals of the given rays' hits, in camera axes, and stores them in `normal`, which holds the hits'
+ * reference coordinates before. t, parts, cells: depth, mesh part and cell of each hit. A hit whose mesh part is -1 (a
+ * hit in a polyhedron) already has its normal. */
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
                                                             vf t, vi parts, vi cells, vf normal[3])
 {
@@ -157,7 +160,7 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
-/* Returns whether the surface is one of the frame's opaque ones, which come first. */
+/* Returns whether the surface is opaque: the opaque ones come first in kernel_frame.surfaces. */
 SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *s)
 {
     return s < p->frame->surfaces + p->frame->opaque_count;
@@ -169,7 +172,8 @@ SIMD_INLINE void kernel_gradient_to_camera_axes(const kernel_tile *tile, vf g[3]
     g[2] -= g[0] * tile->shear_x + g[1] * tile->shear_y;
 }
 
-/* Computes the unit normal, in world axes, that kernel_shade() uses: it points to the eye's side. */
+/* Computes the unit normals of hits in world axes. Like those that kernel_shade() uses, they point to the eye's side of
+ * the surface. normal: vectors of any length along the normals, in camera axes. */
 SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
@@ -193,9 +197,9 @@ static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_pa
     kernel_world_normal(p, normal, colour);
 }
 
-/* Stores the unit normal of a hit that is lit later in the fragment's members t_out and transmittance: the normal is
- * projected to the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one (Meyer et al. 2010).
- */
+/* For hits that are lit later (RENDER_UNLIT), stores the unit normals in the fragments' members t_out and
+ * transmittance. For that, a normal is projected to the octahedron |x| + |y| + |z| = 1, whose lower half is folded over
+ * the upper one (Meyer et al. 2010). */
 static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
                                                          kernel_fragments *f)
 {
@@ -240,8 +244,9 @@ typedef struct kernel_surface_hits {
     vf reach;
     vf opacity;    /* used only by transparent surfaces */
     vi part, cell; /* the cells that are hit, as in kernel_hits */
-    /* The vertices of the cells: x, y and z in tile space, and the field minus the isovalue, scaled; by vertex and
-     * lane. lane: the lane that holds each ray's cell. The number of vertices is 0 for polyhedra. */
+    /* The vertices of the cells that are hit. vertices: x, y and z in tile space (elements 0 to 2), and the field minus
+     * the isovalue, times a power of two (element 3), each by vertex and lane. lane: the lane that holds each ray's
+     * cell. vertex_count: number of vertices of a cell; 0 for polyhedra, for which `vertices` is not set. */
     int vertex_count;
     vi lane;
     const float (*vertices[4])[SIMD_WIDTH];

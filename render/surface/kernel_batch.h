@@ -1,7 +1,7 @@
 /* Traces tets in a tile by batches. A batch is the vector of up to SIMD_WIDTH cells, one per lane, that a queue
- * (kernel_surface_cells) has collected:
+ * (kernel_surface_cells) has collected. It is processed in two stages:
  *     lanes are cells:     fetched, sorted, transformed; edge functions computed    (once per batch)
- *     lanes are pixels:    each uses the edge functions of its own cell
+ *     lanes are pixels:    each pixel's ray is tested by the edge functions of its cell    (once per vector of rays)
  * The box of a cell is the rectangle of the tile's pixels that may see the cell. The pixels of the cells' boxes are
  * listed one after the other, and SIMD_WIDTH of these rays are traced at once. Each lane then has a ray and the index
  * of the lane that holds its cell, and reads the cell's numbers from the batch's vectors by a permutation.
@@ -50,13 +50,14 @@ typedef struct kernel_batch {
 
 /* ---- lanes are cells ---- */
 
-/* Stores the indices in the mesh part of the sorted vertices of lane n's cell. */
+/* Stores the mesh part's indices of the vertices of lane n's cell, in the order of coordinates (kernel_cell.h). */
 SIMD_INLINE void kernel_batch_vertices(const kernel_batch *b, int n, int64_t out[4])
 {
     for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_index(b->queued, b->tets.vertex[i][n]);
 }
 
-/* Sets up the batch with the queue's cells. */
+/* Begins a batch with the queued cells: transforms them into tile space, and reads their values, minus the isovalues,
+ * and colours. */
 static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace *t, kernel_batch *b,
                                                          kernel_surface_cells *queued)
 {
@@ -106,9 +107,9 @@ static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch 
 
 /* ---- lanes are pixels ---- */
 
-/* Returns the rays that hit the surface in their cells where they are visible. is_whole: set if the rays are a whole
- * packet, which has one cell; *depth: depths of the hits; has_colour: set if *w, the values of the colour field at the
- * hits, are computed, too. */
+/* Returns the rays that have a visible hit on the surface in their cells. is_whole: set if the rays are a whole packet,
+ * which has one cell; *depth: depths of the hits; has_colour: set if *w, the values of the colour field at the hits,
+ * are computed, too. */
 SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_batch *b, const kernel_lane_rays *r,
                                       bool is_whole, bool has_colour, vf *depth, vf *w)
 {
@@ -131,7 +132,7 @@ SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_b
     return kernel_visible_lane_hits(t, r, change, *depth);
 }
 
-/* Computes the field of the contour lines in lane n's cell. */
+/* Computes the contour lines' field in lane n's cell: element n of line_value, line_gradient and line_along. */
 static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
 {
     double world[4][3];
@@ -264,8 +265,9 @@ static __attribute__((noinline)) void kernel_batch_trace(kernel_tile_trace *t, k
 
 /* ---- batches ---- */
 
-/* Sets up the packets of the n-th cell's blocks, and lists its rays. Traces the list if it is full. is_whole: set if
- * all rays of the given blocks are listed, instead of those of the cell's box. */
+/* Sets up the packets of the blocks that the n-th cell may meet, and appends the cell's rays to the batch's list.
+ * Traces the list if it is full. is_whole: set if all rays of `blocks` are listed; otherwise those of the cell's box
+ * are listed, and `blocks` is not used. */
 SIMD_INLINE void kernel_batch_list_rays(kernel_tile_trace *t, kernel_batch *b, int n, unsigned blocks, bool is_whole)
 {
     for (unsigned left = b->queued->blocks[n] & ~t->begun; left; left &= left - 1)

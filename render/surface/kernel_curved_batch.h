@@ -1,15 +1,16 @@
 /* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile (kernel_batch.h defines batch, block and
  * box). A cell of a few pixels would leave most lanes of a block's packet idle, and half of the rays in the cell have
  * no crossing. So rays of several cells are listed one after the other and traced in vectors, each lane with a ray and
- * the index of the lane that holds its cell. After each stage the undecided rays are moved together again:
+ * the index of the lane that holds its cell. After each stage the undecided rays are moved together again. The stages,
+ * with their rays, question and method, are:
  *     pixels of boxes       where is the only root in a cuboid?             kernel_cuboids.h
  *     undecided rays        is the only crossing known, or is there none?   kernel_contraction.h
  *     undecided rays        which faces does the ray cross?                 signs of edge functions
  *     rays with two faces   where, and what is the field there?             bilinear patches
  *     rays with one root    where is it, and what is its normal?            Newton's method
  *     other rays            which roots are there?                          kernel_roots.h
- * If the field is known to be monotone along all of the tile's rays (kernel_roots.h), the signs at the faces decide
- * whether there is a root. Rays of other cells are searched for roots.
+ * If the field in a cell is known to be monotone along all of the tile's rays (kernel_roots.h), its signs at the two
+ * faces decide whether a ray has a root. Rays in other cells are searched for roots.
  *
  * Rays with an edge function of uncertain sign, and rays that do not cross exactly two faces once each, are traced cell
  * by cell (kernel_surface.h). All operations except those of kernel_cuboids.h are those for a single cell in the same
@@ -49,7 +50,8 @@
 typedef struct kernel_curved_batch {
     const kernel_surface_cells *queued;    /* the cells that are being traced */
     kernel_transformed_curved transformed; /* these cells in tile space */
-    /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
+    /* the colour field's values by vertex and lane, in its transfer function's domain; set only if the layer has a
+     * colour field */
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_cuboids cuboids;
@@ -62,8 +64,9 @@ typedef struct kernel_curved_batch {
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
-    /* the ends of the intervals of the rays in `found` and in `others` (kernel_curved_ends_add()); if a root is known
-     * by contraction, it is stored instead of the first end */
+    /* The ends of the intervals of the rays in `found` and in `others`: by end, then t, value and reference coordinates
+     * of the point, then ray (kernel_curved_ends_add()). If a ray's root is known by contraction, it is stored instead
+     * of the first end. */
     float found_ends[2][5][KERNEL_LIST_ROOM], other_ends[2][5][KERNEL_LIST_ROOM];
 } kernel_curved_batch;
 
@@ -74,7 +77,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
     memset(h->lines, 0, sizeof h->lines);
 }
 
-/* Returns the batch's cells in the form that the functions for rays in cells take. */
+/* Returns the batch's cells as a kernel_curved, the form in which the search for roots reads cells. */
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 {
     return (kernel_curved){
@@ -97,9 +100,9 @@ SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kerne
         h->cells[n].vertices[i] = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
 }
 
-/* Traces some of the rays from index `first` on in the list `rays` cell by cell; rays with the same cell and packet are
- * traced together. at_lanes: position of each ray among the tile's packets; wanted: mask of the rays to trace. Returns
- * a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Traces, cell by cell, those rays of the vector that begins at index `first` of the list `rays` whose bits are set in
+ * `wanted`. Rays with the same cell and packet are traced together. at_lanes: position of each ray of the vector among
+ * the tile's packets. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                            const kernel_pixel_list *rays, int first,
                                                                            vi at_lanes, unsigned wanted)
@@ -132,9 +135,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 
 /* ---- rays ---- */
 
-/* Returns the rays that have no root because they stay outside of the slab |L| <= thickness in which the isosurface
- * lies (kernel_bounds.h), as long as they are between the cell's bounding planes. The field at the faces then has L's
- * sign. */
+/* Returns the rays that have no root because, between the cell's bounding planes, they stay outside of the slab in
+ * which the isosurface lies. The slab is |L| <= thickness, where L is the linear function that approximates the field
+ * in the cell (kernel_bounds.h). Outside of it the field has L's sign, at the faces, too. */
 SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi lane, const kernel_contraction *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
@@ -150,8 +153,8 @@ SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi 
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Moves rays of the list h->rays to its index `kept` and the following ones. rays: which of the SIMD_WIDTH rays from
- * index n on are moved (a bit mask). Returns the new number of kept rays. */
+/* Keeps some of the SIMD_WIDTH rays from index n on of the list h->rays (bit mask `rays`): moves them to the index
+ * `kept` of the same list and the following ones. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {
@@ -339,9 +342,9 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     kernel_curved_batch_store_normal(t, gradient, r, normal);
 }
 
-/* Accepts the visible hits of those rays that have exactly one root in a cuboid. Rays for which that is uncertain, and
- * rays in other cells, remain in `rays`. Returns a mask of the blocks that contain a ray whose hit is nearer than its
- * previous one. */
+/* Accepts the visible hits of the rays in `rays` that certainly have exactly one root in a cuboid, and drops rays that
+ * certainly have none. Undecided rays, and rays in cells that are not cuboids, remain in `rays`. Returns a mask of the
+ * blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kernel_tile_trace *t,
                                                                             kernel_curved_batch *h)
 {

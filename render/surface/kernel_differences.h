@@ -33,8 +33,8 @@
  * point: the sample is the least of their values, whichever is tested first and on whichever rank.
  *
  * If other ranks may have cells around the hits (job->waiting is set), their samples are needed too, and hits become
- * pending. The second half of this file samples around pending hits and lights them, in the same tiles and packets in
- * which they were hit. */
+ * pending. The second half of this file samples the field around pending hits, in the tiles and packets of their rays;
+ * kernel_packet_surface.h then lights these hits. */
 
 /* One point per ray at which the field is sampled, for normals by central differences, and the field there. */
 typedef struct kernel_probe {
@@ -56,7 +56,7 @@ SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
         c->f[i] = kernel_clamp((c->values[i] - probe->isovalue) * probe->surface->value_scale, 1e18);
 }
 
-/* Computes the interval of the rays in the tet c, which must be in tile space. */
+/* Computes the rays' intervals in the tet c, whose vertices must have been transformed into tile space. */
 SIMD_INLINE void kernel_probe_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
 {
     const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays};
@@ -212,8 +212,9 @@ SIMD_INLINE vm kernel_probe_sample_at(const kernel_packet *p, kernel_probe *prob
 }
 
 /* Takes six samples of the field around each hit at depth t, at the distance `reach` (scaled units) from it: before and
- * behind the hit along the first world axis, then along the second and the third. value: index of the isovalue, which
- * is subtracted; found[i]: rays whose sample i lies in a cell. s must be one of the frame's surfaces. */
+ * behind the hit along the first world axis, then along the second and the third. value: index of the isovalue in the
+ * layer. values[i]: the rays' samples number i, minus the isovalue; found[i]: the rays whose sample number i lies in a
+ * cell. s must be one of the frame's surfaces. */
 static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
                                                                 int value, vm hit, vf t, vf reach,
                                                                 vm found[RENDER_DIFFERENCE_SAMPLES],
@@ -292,7 +293,7 @@ SIMD_INLINE void kernel_pending_group_reset(kernel_pending_group *group)
     group->tile.x0 = group->tile.y0 = -1;
 }
 
-/* Finds the surface and the isovalue to which a pending hit's kind belongs. */
+/* Sets the group's surface and the index of its isovalue to those of hits of the given kind. */
 SIMD_INLINE void kernel_pending_find_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
@@ -303,8 +304,8 @@ SIMD_INLINE void kernel_pending_find_surface(kernel_pending_group *group, const 
     }
 }
 
-/* Sets up the group that begins with hits[0]: its tile, packet, surface and isovalue, and its hits, of which
- * group->count becomes the number. count: number of hits that remain in the list. */
+/* Forms the group that begins with hits[0], and sets its tile, packet, surface and isovalue. group->count becomes the
+ * number of its hits. count: number of hits that remain in the list. */
 static void kernel_pending_group_begin(kernel_pending_group *group, const kernel_frame *f, kernel_thread *thread,
                                        const render_pending_hit *hits, int64_t count)
 {

@@ -1,7 +1,8 @@
 /* Draws lines along those edges of cells that lie in the surface, over the colours of hits. The cells are tets and
  * pyramids, each built on a face of a mesh by the session (outer surfaces). The distance from a hit to an edge is
  * measured in the picture, so that lines have the same width for any orientation of a face. In the following, a ray's
- * plane is the plane x, y of tile space with the ray at the origin (kernel_cell.h). */
+ * plane has the axes x and y of tile space, with the ray at the origin: points are projected to it along the ray
+ * (kernel_cell.h). */
 #ifndef RENDER_KERNEL_EDGES_H
 #define RENDER_KERNEL_EDGES_H
 
@@ -34,8 +35,8 @@ SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Computes the position of a vertex of tile space, one per ray, in each ray's plane: x and y minus those of the ray at
- * the vertex's depth. */
+/* Projects one vertex per ray, given in tile space, to the ray's plane: its x and y minus those of the ray at the
+ * vertex's depth. */
 SIMD_INLINE void kernel_edge_position(const kernel_packet *p, vf x, vf y, vf z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
@@ -103,8 +104,9 @@ SIMD_INLINE vf kernel_squared_face_edge_distance(const kernel_packet *p, const k
     return nearest;
 }
 
-/* Replaces the distances and lengths of kernel_squared_face_edge_distance() on the rays in `hit` whose cell lies on a
- * polygon by those of the polygon's edges. */
+/* Corrects the results of kernel_squared_face_edge_distance() on the rays in `hit` whose cell lies on one of the faces
+ * into which a polygon was divided (render_part.loops). There, *nearest becomes the squared distance to the nearest of
+ * the polygon's edges, and *length the squared length of the longest of them. */
 static __attribute__((noinline)) void kernel_set_polygon_distances(const kernel_packet *p, const kernel_surface_hits *h,
                                                                    vm hit, vf *nearest, vf *length)
 {

@@ -44,8 +44,8 @@ SIMD_INLINE void kernel_surface_cells_set_reach(const kernel_tile_trace *t, kern
     }
 }
 
-/* Makes a packet of rays in lanes. Its rays have the same pixels as in the tile's packets, and their ends and hits are
- * not set. */
+/* Makes a packet of the rays in the lanes, with the pixels that they have in the tile's packets. Only the members that
+ * clips and colours need are set; active, t_near, t_far and hits are not. */
 SIMD_INLINE void kernel_packet_of_lane_rays(const kernel_tile_trace *t, const kernel_lane_rays *r, kernel_packet *out)
 {
     const kernel_packet *first = &t->packets[0];
@@ -81,8 +81,8 @@ SIMD_INLINE vm kernel_visible_lane_hits(const kernel_tile_trace *t, const kernel
     return kernel_lane_hits_kept_by_clips(t, &copy, visible, depth);
 }
 
-/* Emits a ray's hit on the n-th of the cells as a fragment of its own. Callers do this if the hit has the same depth as
- * the ray's nearest hit. ray: lane of the packet p. */
+/* Emits a ray's hit in the cell in lane n of `cells` as a fragment of its own. Callers do this if the hit has the same
+ * depth as the ray's nearest hit. ray: lane of the packet p. */
 static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                         int ray, const kernel_surface_cells *cells,
                                                                         int n, float depth, const float normal[3],
@@ -100,7 +100,7 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
     kernel_accept_equal_depth(p, s, vm_from_bits(1u << ray), &h);
 }
 
-/* Accepts a hit of an opaque surface on the n-th of the cells: keeps it if it is the nearest hit of its ray, as
+/* Accepts a hit of an opaque surface in the cell in lane n of `cells`: keeps it if it is the nearest hit of its ray, as
  * kernel_accept() does for the rays of a packet. at: position of the ray among those of the tile's packets (packet *
  * SIMD_WIDTH + lane); normal: as in kernel_hits; colour: before lighting. Returns the bit of the ray's block if the hit
  * is nearer than the ray's previous one, and otherwise 0. */
@@ -169,7 +169,7 @@ SIMD_INLINE vm kernel_lane_hits_add_crossings(kernel_tile_trace *t, const kernel
     return vm_from_bits(kept);
 }
 
-/* Sets the members of *h that describe the cells of the rays. */
+/* Sets the members of *h that describe the cells that are hit. lane: the lane of `cells` that holds each ray's cell. */
 SIMD_INLINE void kernel_lane_hits_set_cells(const kernel_tile_trace *t, const kernel_surface_cells *cells, vi lane,
                                             kernel_surface_hits *h)
 {

@@ -2,10 +2,10 @@
  *
  * A ray's profile is the piecewise linear field along the ray in a polyhedron (kernel_polyhedron.h). Hits on
  * isosurfaces are the points of the profile at which the sign changes. They are exact, because a linear piece has at
- * most one root. All of them are computed, even on rays that are on the same side of the isovalue at both faces.
+ * most one root. All hits are computed, even on rays whose field is on the same side of the isovalue at both faces.
  *
- * Most such rays stay on that side, and need not be followed. A bound identifies many of them, from the values at the
- * faces' triangles alone, where values are relative to the isovalue:
+ * On most such rays the field stays on that side, so that their profiles need not be followed. A bound identifies many
+ * of them from the values at the faces' triangles alone. Values are relative to the isovalue:
  *
  *      v |                               along the tile's rays no tet's field falls faster than `fall` or rises faster
  *        | in                . out       than `rise`. So between the faces' triangles the field is above both lines,
@@ -15,9 +15,9 @@
  *        +-----------------------> t
  *                                        and likewise for rays below the isovalue.
  *
- * Isovalues outside the range of the vertices' values are not searched for: if tets overlap, their sum may exceed that
- * range, but trees and the session's plan assume that a cell has surfaces only for isovalues between its vertices'
- * values. */
+ * Isovalues outside the range of the vertices' values are not searched for. If tets overlap, the field, which is the
+ * signed sum of the tets' fields, may exceed that range, but trees and the session's plan assume that a cell has
+ * surfaces only for isovalues between its vertices' values. */
 #ifndef RENDER_KERNEL_POLYHEDRON_SURFACE_H
 #define RENDER_KERNEL_POLYHEDRON_SURFACE_H
 
@@ -89,8 +89,9 @@ static void kernel_polyhedron_find_facets(const kernel_poly_crossings *r, vm hit
     memcpy(out, &facet, sizeof facet);
 }
 
-/* Computes the field's gradient at the hits, in camera axes: that in the tet of kernel_polyhedron_find_facets() or, if
- * tets overlap, the signed sum of the gradients in the tets that contain the hit. */
+/* Computes the field's gradient at the hits, in camera axes: the gradient in the tet that
+ * kernel_polyhedron_find_facets() finds. If tets overlap, it is instead the signed sum of the gradients in the tets
+ * that contain the hit, where that sum is valid. */
 static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     int32_t facets[SIMD_WIDTH];
@@ -397,7 +398,8 @@ static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s,
     }
 }
 
-/* Traces the surfaces of all isovalues of a layer in a polyhedron. part, index: the cell. */
+/* Traces the surfaces of all isovalues of a layer in a polyhedron. part, index: mesh part, and index of the polyhedron
+ * in it. */
 static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s, int part, uint32_t index, vm rays)
 {
     const render_surface_layer *layer = s->layer;

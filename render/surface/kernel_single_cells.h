@@ -9,9 +9,10 @@
 #include "kernel_surface.h"
 #include "kernel_tile_trace.h"
 
-/* Traces a cell with the rays of each of the given blocks (squares of 4 × 4 pixels). cell, curved: a hex, wedge or
- * pyramid in tile space, of which the surface of the isovalue with index `value` is traced; NULL for the polyhedron
- * with this part and index, in which all isovalues of the layer are traced. */
+/* Traces a cell with the rays of each of the given blocks (squares of 4 × 4 pixels). If `cell` is not NULL, it and
+ * `curved` hold a hex, wedge or pyramid in tile space, in which the surface of the isovalue with the index `value` is
+ * traced. If it is NULL, the cell is the polyhedron with this part and index, in which the surfaces of all of the
+ * layer's isovalues are traced. */
 static __attribute__((noinline)) void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part,
                                                           uint32_t index, const kernel_cell *cell,
                                                           const kernel_curved *curved, int value)

@@ -44,8 +44,8 @@ SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surfac
     return hit;
 }
 
-/* Computes the normals of hits for layers that do not use the gradient in the hit's cell, which is already set. Returns
- * the hits that have a normal; the others are pending. */
+/* Computes the normals of hits, unless the layer's normals are the gradients in the hits' cells, which are already set.
+ * Returns the hits that have a normal; the others are pending. */
 SIMD_INLINE vm kernel_hit_normals(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, h->part, h->cell, h->normal);
@@ -99,8 +99,8 @@ static __attribute__((noinline)) void kernel_emit_transparent(kernel_packet *p, 
 
 /* Draws contour lines over the hits' colours. If only the lines of the surface are drawn (render_lines.is_alone),
  * multiplies the hits' opacities by the share of the pixel that a line covers, and returns the hits on a line.
- * Otherwise returns all hits. In a picture of values (RENDER_VALUES) no colours are drawn. There, lines that are drawn
- * alone make the value of the lines' field the hits' value, if the surface has no colour field. */
+ * Otherwise returns all hits. In a picture of values (RENDER_VALUES) no colours are drawn. If only the lines are drawn
+ * there, and the surface has no colour field, a hit's value (h->colour[0]) becomes that of the lines' field. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
                                                         kernel_surface_hits *h)
 {
@@ -147,9 +147,9 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit
     if (vm_any(hit)) kernel_emit_transparent(p, s, hit, h);
 }
 
-/* Returns a field at the reference coordinates r in each ray's own cell. values: the field by vertex and lane; lane:
- * the lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single function for all
- * cell types that is not inlined. */
+/* Returns the value of a field at the reference coordinates r, in each ray's own cell. values: the field by vertex and
+ * lane; lane: the lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single
+ * function for all cell types that is not inlined. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {

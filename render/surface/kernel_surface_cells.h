@@ -13,8 +13,8 @@
 typedef struct kernel_surface_cells {
     int type, count; /* type of the cells; number of queued cells */
     int layer, part; /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
-    /* the arrays of the layer's field and of the mesh part or, if the part's indices do not fit in 32 bits, those in
-     * `copied` */
+    /* the arrays from which the vertices' coordinates and values are read: those of the mesh part and of the layer's
+     * field or, if the part's indices do not fit in 32 bits, those in `copied` */
     kernel_arrays arrays;
     uint32_t cell[SIMD_WIDTH]; /* index of the cell in the mesh part */
     /* copies of the members of kernel_tile_candidate: the blocks and the box of pixels that the cell may meet, and its
@@ -22,7 +22,8 @@ typedef struct kernel_surface_cells {
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     float near[SIMD_WIDTH];
     int value[SIMD_WIDTH]; /* index of the isovalue in the layer */
-    /* reach of hits in the cell (kernel_difference_sample_distance()); set only if normals come from differences */
+    /* distance from hits in the cell to the samples of central differences (kernel_difference_sample_distance()); set
+     * only if normals come from differences */
     float reach[SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
     /* by vertex and lane: index of the vertex in `arrays` (kernel_surface_cells_index()) */
@@ -53,8 +54,8 @@ SIMD_INLINE int64_t kernel_surface_cells_index(const kernel_surface_cells *own, 
     return own->arrays.has_lanes ? vertex : own->index[vertex];
 }
 
-/* Stores the vertices of the cell in lane n from their indices in the mesh part, and prefetches their coordinates and
- * values. */
+/* Sets the vertices of the cell in lane n, given by their indices in the mesh part, and prefetches their coordinates
+ * and values. */
 static __attribute__((noinline)) void kernel_surface_cells_set_vertices(kernel_surface_cells *own, int n,
                                                                         const int64_t *vertices)
 {
@@ -125,8 +126,9 @@ SIMD_INLINE unsigned kernel_surface_cells_visible_blocks(const kernel_tile_trace
     return own->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, own->near[n]);
 }
 
-/* Completes the data of the queued cells. Fills the unused lanes with the vertices and the isovalue of the first cell,
- * so that all lanes can be transformed. */
+/* Completes the queue before its cells are transformed: copies coordinates and values if the mesh part's indices do not
+ * fit in 32 bits, and fills the unused lanes with the vertices and the isovalue of the first cell, so that all lanes
+ * can be transformed. */
 SIMD_INLINE void kernel_surface_cells_close(const kernel_tile_trace *t, kernel_surface_cells *own)
 {
     if (__builtin_expect(!own->arrays.has_lanes, 0)) kernel_surface_cells_copy(t, own);

@@ -54,7 +54,7 @@ typedef struct kernel_tile_search {
     kernel_candidate items[2 * SIMD_WIDTH];
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
-    float pad[2]; /* margins by which columns and rows are extended, in pixels */
+    float pad[2]; /* margins, in pixels, by which a node's box of pixels is extended: columns, rows */
 } kernel_tile_search;
 
 static void kernel_tile_queue_begin(kernel_tile_search *m)

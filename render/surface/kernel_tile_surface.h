@@ -131,9 +131,9 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
 }
 
 /* Computes the first and last column (shift 0) or row (shift 8) of pixels that each lane's node may meet, and adds them
- * to its box of pixels. low: lower bound of the signed distance from the tile's first border; high: upper bound of the
- * signed distance from its last border; scale: pixels per unit of distance; pad: margin in pixels. Returns the lanes
- * that meet a pixel. A NaN counts as meeting all pixels. */
+ * to its box of pixels. low: lower bound of the node's signed distance from the tile's first border (left or top);
+ * high: upper bound of its signed distance from the last border (right or bottom); scale: pixels per unit of distance;
+ * pad: margin in pixels. Returns the lanes that meet a pixel. A NaN counts as meeting all pixels. */
 SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box, int shift)
 {
     const vf end = vf_set(KERNEL_TILE), zero = vf_set(0);
@@ -269,8 +269,8 @@ static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *
     for (int n = 0; n < count; n++) kernel_tile_find_cells(t, (int)parts[n]);
 }
 
-/* Traces the current layer's surface on all mesh parts. The nearest opaque hits are then stored in the tile's packets.
- */
+/* Finds the cells of all mesh parts that the current layer's surface may cross in the tile. They are queued; full
+ * queues are traced at once. */
 SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -282,7 +282,7 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
         kernel_tile_parts(t, 0, &part, 1, t->traced_blocks);
 }
 
-/* Computes the scales and margins by which the boxes of pixels of the tile's nodes are computed. */
+/* Sets the scales and margins from which nodes' boxes of pixels are computed (kernel_node_pixels()). */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
     kernel_tile_search *s = t->search;
