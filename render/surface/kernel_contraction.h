@@ -1,5 +1,5 @@
-/* Computes a ray's only crossing of the isovalue in a cell that is nearly affine, without intersecting the cell's
- * faces.
+/* Computes the point at which a ray crosses the isovalue in a cell whose map is nearly affine, if there is exactly one
+ * such point, without intersecting the cell's faces.
  *
  * Let X be a position in tile space, r its reference coordinates in the cell, and J0 the Jacobian of X(r) at the middle
  * of the reference domain. Then J0^-1 X = r + N(r), and the field minus the isovalue is L(X) + E(r), with a linear
@@ -147,8 +147,8 @@ SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
 
 /* Returns the rays for which the step s = f(q) - q of the iteration proves that the domain D contains no root (case
  * "none" at the top of this file). If there were a root, |s| would be at most two diameters of D. So the rounding error
- * of both sides is at most 2 error_bound (|s| + 2), for which 8 error_bound and a thousandth of |s|^2 are more than
- * enough. */
+ * of both sides of the test is at most 2 error_bound (|s| + 2), for which 8 error_bound and a thousandth of |s|^2 are
+ * more than enough. */
 SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_support(type, c->domain_margin, s) - kernel_dot(s, q);

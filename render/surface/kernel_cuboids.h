@@ -34,16 +34,17 @@ enum { KERNEL_CUBOID_STEPS = 8 };
 #define KERNEL_CUBOID_END 1e-4f
 
 /* Upper bound of the rounding error of a Bernstein coefficient, with u = 6e-8. The field's magnitude at vertices is at
- * most 2. So the eight coefficients of the field's polynomial are at most 2, three times 4, three times 8, and 16, and
- * have errors of at most u times 4, 24 and 72 each: 1e-5 together. The sums of the absolute values of all terms of k0
- * to k3 are at most 54, 108, 72 and 16; each term has up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
+ * most 2. So the magnitudes of the eight coefficients of the field's polynomial are at most 2 (one coefficient), 4
+ * (three), 8 (three) and 16 (one). The first is exact, and the others have errors of at most u times 4, 24 and 72 each:
+ * 1e-5 together. The sums of the absolute values of all terms of k0 to k3 are at most 54, 108, 72 and 16; each term has
+ * up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
 #define KERNEL_CUBOID_ROUNDING 1.5e-4f
 
 /* Coefficients and error bounds of cuboids, one cuboid per lane. */
 typedef struct kernel_cuboids {
     float normal[3][3][SIMD_WIDTH]; /* rows of the inverse of the map's Jacobian; columns: axes of tile space */
     float field[8][SIMD_WIDTH];     /* coefficients of the field's polynomial (kernel_map.h) */
-    /* error bound of the field's Bernstein coefficients along a ray, relative to a field near 1 */
+    /* error bound of the field's Bernstein coefficients along a ray, for a field whose largest magnitude is near 1 */
     float value_error[SIMD_WIDTH];
     float domain_margin[SIMD_WIDTH]; /* margin in reference coordinates; infinite for cells that are not cuboids */
 } kernel_cuboids;
@@ -79,10 +80,10 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
     return most;
 }
 
-/* Computes value_error and domain_margin of the lanes in `cuboid`. gap: upper bound of the distance between a face's
- * computed crossing and the ray; own: error bound of a ray's reference coordinates; reach: largest magnitude of the
- * vertices' coordinates. gap and own are derived at kernel_f64_bounds() and kernel_f64_contraction_bounds(), and are
- * doubled as there. */
+/* Computes value_error and domain_margin of the lanes in `cuboid`. In the code, reach is the largest magnitude of the
+ * vertices' coordinates, gap an upper bound of the distance between a face's computed crossing and the ray, and own an
+ * error bound of a ray's reference coordinates; gap and own are in reference coordinates. Both are derived at
+ * kernel_f64_bounds() and kernel_f64_contraction_bounds(), and are doubled as there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {

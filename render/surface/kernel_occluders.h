@@ -30,7 +30,8 @@
  * origins are lifted off the surface (render_light.h) is much larger.
  *
  * A box test may accept a ray that misses the box, but never the reverse. Everything else depends on the ray and the
- * cell alone. So results do not depend on the trees, on their order, or on which rank holds a cell. */
+ * cell alone. So results do not depend on the trees, on the order in which they are traversed, or on which rank holds a
+ * cell. */
 #ifndef RENDER_KERNEL_OCCLUDERS_H
 #define RENDER_KERNEL_OCCLUDERS_H
 
@@ -168,8 +169,8 @@ SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, floa
     kernel_prepared_ray_axes(ray, p);
 }
 
-/* Returns the boxes, given in six rows of lanes (lower and upper corners), that the ray meets; stores the distances at
- * which it enters and leaves them. */
+/* Returns a mask of the boxes that the ray meets, one box per lane. rows: six rows of lanes with the boxes' lower and
+ * upper corners. *low and *high become the distances along the ray at which it enters and leaves the boxes. */
 SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);

@@ -112,8 +112,8 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     }
 }
 
-/* Makes the rays inactive that are blocked in the current interval of r, by following the profile of the field along
- * them (kernel_polyhedron_surface.h). */
+/* Makes the rays inactive that are blocked in their current interval (r->interval) in a polyhedron. For that, it
+ * follows each ray's profile, the piecewise linear field along the ray (kernel_polyhedron_surface.h). */
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;

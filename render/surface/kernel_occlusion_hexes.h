@@ -25,8 +25,8 @@ typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    /* The following members describe the pairs' rays, as in kernel_prepared_ray. Components of origins and shears are
-     * in the order kx, ky, kz of each ray's own axes. */
+    /* The following members, except `record`, describe the pairs' rays, as in kernel_prepared_ray. Components of
+     * origins and shears are in the order of the axes kx, ky and kz, which are chosen for each ray. */
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
@@ -41,7 +41,8 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
-/* Fills the given lane of the pairs with a ray and the index of a record of a hex. */
+/* Sets those members of a pair that describe its ray, and the place of its hex's record. lane: the pair's lane; record:
+ * index of the record in kernel_occluders.hexes. */
 SIMD_INLINE void kernel_pairs_set_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
                                       kernel_curved_pairs *out)
 {

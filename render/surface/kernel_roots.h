@@ -22,9 +22,9 @@
  * first. Bisection ends at 2^-12 of the interval: a pair of roots that is missed there dips below 0 by at most |F''|
  * (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
  *
- * Before any piece, bounds of the whole cell are tested (kernel_bounds.h): if the field is monotone along every ray in
- * the cell, the signs at the faces decide; if a linear function that approximates the field is far enough from 0 at
- * both faces, with the same sign, there is no root.
+ * Before any piece is processed, bounds of the whole cell are tested (kernel_bounds.h): if the field is monotone along
+ * every ray in the cell, the signs at the faces decide; if a linear function that approximates the field is far enough
+ * from 0 at both faces, with the same sign, there is no root.
  *
  * In a pyramid the term m = a b / k (kernel_map.h) is not a polynomial, but its second derivative along a line has one
  * sign. So F(c(u)) lies between its chord and the tangents at its ends, and e(u) between 0 and its tangents: the slopes
@@ -95,8 +95,9 @@ SIMD_INLINE void kernel_search_bounds(const kernel_bounds *b, vi lane, kernel_se
 }
 
 /* Computes how far the map bends along the chord between two points in reference coordinates. *size: the larger of |e1|
- * and |e2| (the top of this file); *slope: the largest Bernstein coefficient of e's derivative, divided by 3. m: the
- * map's product (kernel_map.h) at both ends; move: to - from. */
+ * and |e2|, by which the distance from the chord to the ray is bounded (top of this file); *slope: the largest
+ * Bernstein coefficient of e's derivative, divided by 3. m: the map's product (kernel_map.h) at both ends; move: to -
+ * from. */
 SIMD_INLINE void kernel_compute_chord_bend(const kernel_search *s, const vf from[3], const vf to[3],
                                            const kernel_product m[2], const vf move[3], vf *size, vf *slope)
 {
@@ -172,8 +173,9 @@ SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf 
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
-/* Returns the distance of Y(r) from the ray's point at the same depth, mapped to Y (see the top of this file). r: the
- * reference coordinates of a crossing of a face, which are rounded or belong to a point beside the ray. */
+/* Returns by how far a computed crossing of a face misses its ray, measured in Y = J0^-1 X (top of this file): the
+ * distance from Y at the crossing's reference coordinates to Y at the ray's point at the crossing's depth. It is not 0
+ * if the reference coordinates are rounded, or belong to a point beside the ray. */
 SIMD_INLINE vf kernel_face_distance_from_ray(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map *map = &s->map;
@@ -202,7 +204,8 @@ SIMD_INLINE void kernel_search_begin(kernel_search *s)
     s->size = vf_set(0.5f);
 }
 
-/* Returns the linear function L (kernel_bounds.h) of each ray's cell at depth t on the ray. */
+/* Returns the value, at depth t on each ray, of the linear function L that approximates the field in the ray's cell
+ * (kernel_bounds.h). */
 SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
     vf g[3], at[3];
@@ -234,7 +237,7 @@ SIMD_INLINE vm kernel_decide_by_ends(const kernel_curved *c, const kernel_rays *
 }
 
 /* Tests the whole interval as one piece, from the reference coordinates and values at the faces. This decides most
- * rays. */
+ * rays. Adds the rays with an isolated root to s->found; s->open becomes the rays whose interval must be bisected. */
 SIMD_INLINE void kernel_search_test_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -349,7 +352,8 @@ SIMD_INLINE void kernel_search_test_exit_faces(kernel_search *s)
     kernel_point_copy_lanes(s->found, &s->end, &s->high);
 }
 
-/* Continues the search with the next roots. Returns false if there are none. */
+/* Continues the search: s->found becomes the rays on which the next root is isolated, perhaps none. Returns false if
+ * the search has ended on all rays. */
 static __attribute__((noinline, unused)) bool kernel_search_continue(kernel_search *s)
 {
     if (vm_any(s->open))
@@ -498,7 +502,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
     return open;
 }
 
-/* Refines the roots that have been found. Rays for which Newton's method does not converge are refined by
+/* Refines the isolated roots of the rays in s->found. Rays for which Newton's method does not converge are refined by
  * bracketing. */
 static __attribute__((noinline, unused)) void kernel_refine_roots(const kernel_search *s, kernel_point *out)
 {
