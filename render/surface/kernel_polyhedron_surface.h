@@ -229,7 +229,7 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
     return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
-/* ---- along the profile ---- */
+/* ---- search for crossings along the profiles ---- */
 
 /* The state of a search along the rays' profiles, from crossing to crossing. A face's own value decides on which side
  * of the isovalue the field is there. If tets overlap at a face, the profile just behind the face may be on the other

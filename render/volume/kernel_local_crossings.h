@@ -1,8 +1,8 @@
 /* Computes where rays enter and leave hexes, wedges and pyramids of volumes, one ray-cell pair per lane: each lane has
  * a ray and the index of the lane that holds its cell. The crossed faces are found by the signs of projected edge
- * functions; quads that look convex on all of a cell's pixels need no more than their edges (kernel_quad.h). The
- * operations are those of kernel_curved_intervals(), which intersects a packet with one cell, so the results are
- * bit-identical. Callers pass the cell type as a constant. */
+ * functions; if a quad's projection is convex for the rays of all of a cell's pixels, its four edges decide
+ * (kernel_quad.h). The operations are those of kernel_curved_intervals(), which intersects a packet with one cell, so
+ * the results are bit-identical. Callers pass the cell type as a constant. */
 #ifndef RENDER_KERNEL_LOCAL_CROSSINGS_H
 #define RENDER_KERNEL_LOCAL_CROSSINGS_H
 
@@ -70,9 +70,9 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
     }
 }
 
-/* Computes, for the faces of all lanes' cells, the order of their corners, and which quads may look nonconvex along a
- * ray. Positions, ranks and field must be set in *cells. ends: first and last column and row of each cell
- * (kernel_local_pixels()). */
+/* Computes, for the faces of all lanes' cells, the order of their corners, and which quads may have a projection that
+ * is not convex (kernel_quad.h). Positions, ranks and field must be set in *cells. ends: first and last column and row
+ * of each cell (kernel_local_pixels()). */
 SIMD_INLINE void kernel_local_compute_faces(const kernel_tile *tile, kernel_transformed_curved *cells,
                                             int32_t ends[4][SIMD_WIDTH], int type)
 {
@@ -123,8 +123,8 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells,
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
 }
 
-/* Reads the corners of the two faces that each ray crosses, if the given rays have at most two different cells. Then
- * one permutation of the two cells' rows reads one number of a vertex for all rays. Most vectors of 16 rays have at
+/* Reads the corners of the two faces that each ray crosses, if the given rays have at most two different cells. One
+ * permutation of these two cells' rows then reads one number of a corner for all rays. Most vectors of 16 rays have at
  * most two cells, because rays are listed cell by cell. Returns false if there are more cells, or if vectors do not
  * have 16 lanes. */
 SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *cells, const kernel_lane_rays *own,

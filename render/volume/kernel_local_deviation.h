@@ -11,7 +11,7 @@
  * computed by that cell's inverse map.
  *
  * In kernel_local.h's reference coordinates r the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
- * along the ray, where the nonlinear terms are n = B b with products b of coordinates. So with r = y - n(r)
+ * along the ray, where the map's nonlinear terms are n = B b with the products b of coordinates. So with r = y - n(r)
  *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B.
  * f0 + g y is linear along the ray. So the field deviates from its chord by h times the deviation of b from b's chord.
  * Because that is small, r need not be known as accurately as for computing the field itself.
@@ -130,7 +130,8 @@ typedef struct kernel_local_chord {
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
     vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
-    /* copies for each ray's cell: the coefficients of the map's nonlinear terms, and h (kernel_local_bounds.terms) */
+    /* gathered from each ray's cell: the coefficients B of the map's nonlinear terms, and h (kernel_local_bounds.terms,
+     * here `own`) */
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
     vf tolerance, residual_limit;
     /* Used instead of the members above if the type is GRID_NO_TYPE: the packet, its cell, the cell's inverse map, and

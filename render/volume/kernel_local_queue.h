@@ -63,9 +63,9 @@ typedef struct kernel_tet_pairs {
 typedef struct kernel_tile_cells {
     /* The tile's candidates; used if the whole picture has been searched. The first open_count items overlap the last
      * window in depth; `next` is the first item that begins behind all windows so far. Only the first `sorted` items
-     * are sorted by their least depth, because a tile that soon becomes dark does not need the others. `ends` are the
-     * partition points of the unfinished quicksort, the nearest one last: no item in front of such an index is farther
-     * than any item behind it. */
+     * are sorted by their least depth; the others are sorted when a window needs them, which saves work in tiles that
+     * soon become dark. `ends` are the partition points of the unfinished quicksort, the nearest one last: no item in
+     * front of such an index is farther than any item behind it. */
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];

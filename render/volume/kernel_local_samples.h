@@ -1,13 +1,14 @@
 /* Computes samples of volumes in hexes, wedges and pyramids, one sample per lane, each lane with its own ray and cell.
  * A cell of a few pixels would leave most lanes of a packet idle, and each sample's value requires Newton's method. So
- * the samples of several cells are listed one after the other and processed in vectors:
+ * the samples of several cells are listed one after the other and processed in vectors. The stages, with their input,
+ * question and method, are:
  *     cells of one type       where are they, and what are their maps?     kernel_local.h
  *     pixels of their boxes   which samples may be in the cell?           by planes around it
  *     samples                 where in the cell, and what is the field?   Newton's method
- * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these is at its
- * limit, so that the crossings of faces give the same result up to rounding. For samples near a face the crossings
- * decide (kernel_crossings.h), because they are bit-identical in both cells of the face. In cells with strongly
- * nonlinear maps the crossings decide for all samples. */
+ * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these coordinates
+ * is at its limit, so that the test by the ray's crossings of faces gives the same result up to rounding. For samples
+ * near a face the crossings decide (kernel_crossings.h), because they are bit-identical in both cells of the face. In
+ * cells with strongly nonlinear maps the crossings decide for all samples. */
 #ifndef RENDER_KERNEL_LOCAL_SAMPLES_H
 #define RENDER_KERNEL_LOCAL_SAMPLES_H
 
@@ -144,7 +145,7 @@ static __attribute__((noinline)) void kernel_curved_samples(kernel_tile_trace *t
     }
 }
 
-/* Computes the values of a vector of listed samples, from index n on, if they lie inside their cells. */
+/* Computes the values of the samples n to n + SIMD_WIDTH - 1 of the list, as far as they lie inside their cells. */
 SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;

@@ -1,6 +1,6 @@
 /* Computes the segments of rays in hexes, wedges and pyramids, one ray-cell pair per lane: each lane has a ray and the
  * index of the lane that holds its cell. kernel_segments.h defines segment, window and cut; kernel_local_deviation.h
- * defines interval, part and chord. Rays for which that is not possible are processed by packets, cell by cell, and
+ * defines interval, part and chord. Rays for which lanes cannot be used are processed by packets, cell by cell, and
  * their intervals are divided by the same rule. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
@@ -131,8 +131,9 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
     kernel_segments_add(b->packets, b->is_double, places, rays, t_in, t_out, &run);
 }
 
-/* The following two functions evaluate a polynomial in u that is 0 at u = -1/2 and 1/2, and has the coefficients f:
- * kernel_local_deviation() returns its value at u, kernel_local_primitive() its integral from 0 to u. */
+/* The following two functions evaluate the polynomial (1/4 - u^2) (f[0] + f[1] u + f[2] u^2), which is 0 at the
+ * interval's ends, u = -1/2 and 1/2. kernel_local_deviation() returns its value at u, kernel_local_primitive() its
+ * integral from 0 to u. */
 SIMD_INLINE vf kernel_local_deviation(const vf f[3], vf u)
 {
     return (0.25f - u * u) * vf_muladd(vf_muladd(f[2], u, f[1]), u, f[0]);
@@ -248,9 +249,9 @@ static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_tr
 
 /* ---- packets of rays in one cell ---- */
 
-/* Adds the rays' intervals in a hex, wedge or pyramid whose field is constant as segments. The value is computed in
- * double if s->is_double is set, because narrow ramps magnify its rounding. reach: first and last depth of the
- * segments to add. */
+/* For a hex, wedge or pyramid with a constant field: adds the rays' intervals in the cell as segments, cut at surfaces.
+ * The value is computed in double if s->is_double is set, because narrow ramps magnify its rounding. reach: first and
+ * last depth of the segments to add. */
 static __attribute__((noinline)) void kernel_constant_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
                                                                vi places, const kernel_cell *c,
                                                                const kernel_interval *i, const vf reach[2])
@@ -384,8 +385,8 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, c
 }
 
 /* Finds the crossed faces of up to SIMD_WIDTH rays, from index n on of the list KERNEL_LOCAL_MET. Rays that certainly
- * cross exactly two faces once each are added to the lists of rays with two crossed faces. Rays for which that is
- * uncertain are processed cell by cell. */
+ * cross exactly two faces once each are added to KERNEL_LOCAL_CROSSED or KERNEL_LOCAL_CROSSED_TRIANGLE. Rays for which
+ * that is uncertain are processed cell by cell. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;

@@ -41,8 +41,8 @@ typedef struct kernel_blend {
     vf depth, rounding_errors[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
     /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
-     * of the interval, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: light that passes all
-     * samples so far. `light` is then the light at the end of the last interval. */
+     * of the interval of depths, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: share of the
+     * light that passes all samples so far. `light` is then that share at the begin of this interval. */
     vf interval_number, within;
 } kernel_blend;
 

@@ -42,8 +42,8 @@ typedef struct kernel_segments {
     const kernel_hits *cut;      /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
     int volume;                  /* index of the volume */
     const kernel_pieces *pieces; /* the volume's transfer function */
-    /* > 0: segments are emitted to be mixed with other volumes (kernel_emit_segment()), with at most this error; 0:
-     * they are integrated here */
+    /* above 0: segments are emitted as fragments, which compositing mixes with other volumes (kernel_emit_segment()),
+     * and this is the allowed error of light; 0: segments are integrated here */
     float mixing;
     kernel_blend blend;
     vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */

@@ -34,8 +34,8 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* KERNEL_OPEN_PIECE: number of cells between two prefetches; KERNEL_SORT_PIECE: ranges of at most that many candidates
- * are sorted completely */
+/* KERNEL_OPEN_PIECE: number of candidates that are processed between two prefetches; KERNEL_SORT_PIECE: the quicksort
+ * of candidates sorts ranges of at most this length at once */
 enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
@@ -131,7 +131,7 @@ static __attribute__((noinline, cold)) void kernel_transformed_set_cell_values(k
 }
 
 /* Transforms the first `count` tets of the queue. From each tet's mask of blocks, removes blocks whose rays all end in
- * front of the tet. Returns the lanes of the visible tets for which a block is left. */
+ * front of the tet. Returns a mask of the lanes with a visible tet for which a block is left. */
 SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
                                                 int count)
 {
