@@ -1,9 +1,9 @@
 /* Bisects those parts of a ray's interval in a hex, wedge or pyramid for which no number of equal segments is accurate
  * enough. At a step of the opacity there is no slope that would bound the effect of a small field error on the light.
- * If a curved field barely reaches the step, the length beyond the step grows with the square root of the excess: at
- * 800 optical depths an error of the field of 1e-6 of the transfer function's domain changes such a pixel by a tenth.
- * So the bisection is computed in double, from the caller's coordinates and values and the ray's position in the
- * picture, one ray at a time, and identically for all instruction sets.
+ * If a curved field barely exceeds the value of the step, the length of the ray on which it does grows with the square
+ * root of the excess: at 800 optical depths an error of the field of 1e-6 of the transfer function's domain changes
+ * such a pixel by a tenth. So the bisection is computed in double, from the mesh's coordinates and values and the ray's
+ * position in the picture, one ray at a time, and identically for all instruction sets.
  *
  * Subintervals. The chord of a subinterval is the linear function with the field's values at the two ends. The field is
  * computed at the ends, quarters and middle; its deviation from the chord is taken as at most d, which is 1.5 times the
@@ -14,8 +14,8 @@
  * monotone, with a margin for nonlinear maps, and so is each part of it. If it is monotone, its values lie between
  * those at its ends, and otherwise between these widened by d to both sides. A subinterval that
  *   - lies on one side of each step and has a chord that is close enough becomes a segment;
- *   - is monotone, with a step strictly between its ends, is cut where the field has the step's value, to rounding;
- *   - is neither is halved, and the halves are treated in the same way, the nearer one first.
+ *   - is monotone, with a step's value strictly between those at its ends, is cut where the field has that value;
+ *   - is of neither kind is halved, and the halves are treated in the same way, the nearer one first.
  * So where a field barely reaches a step, only the subintervals around its extremum are halved, until the subinterval
  * there lies on one side of the step or is too short to be visible.
  *
@@ -94,8 +94,8 @@ static inline double kernel_interpolate(double from, double to, double share)
 }
 
 /* Computes the ray's point at depth t, as kernel_value_at() does, but in double: reference coordinates by Newton's
- * method from the initial guess `guess`, then from the cell's middle. If both fail, they and the field are interpolated
- * between the ends of the interval. */
+ * method from the initial guess `guess`, then from the cell's middle. If both fail, reference coordinates and field are
+ * interpolated between the ends of the interval. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     kernel_exact_point out = {.t = t};
@@ -180,7 +180,7 @@ static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, d
     return out;
 }
 
-/* A subinterval of a ray's interval, which begins where the previous one ends. depth: number of halvings that made it;
+/* A subinterval of a ray's interval, which begins where the previous one ends. depth: number of divisions that made it;
  * is_monotone: the field has been proved to be monotone on it; deviation: largest deviation of the field from its chord
  * at the quarters and the middle; low, high: range of the field's values. */
 typedef struct kernel_subinterval {
@@ -246,8 +246,8 @@ static void kernel_range_between_steps(const kernel_bisection *h, double inside,
     if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_rounded_step(steps[n]), side[0]);
 }
 
-/* Rounds x to float32 and clamps it to `side`, the range between two neighbouring steps; *rest: the rounding error, 0
- * if the result is an end of the range. */
+/* Rounds x to float32 and clamps it to `side`, the range between two neighbouring steps; *rest: the rounding error,
+ * taken as 0 if the result is an end of the range. */
 static void kernel_step_round(const float side[2], double x, float *v, double *rest)
 {
     const double clamped = fmax(fmin(x, (double)side[1]), (double)side[0]);
@@ -273,8 +273,8 @@ static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const ke
 
 /* ---- segments ---- */
 
-/* Returns a segment of the given length (in unit distances) in all lanes. The values at its ends are v[0] + rest[0] and
- * v[1] + rest[1]. */
+/* Returns the same segment in all lanes. length: in unit distances. The values at the segment's ends are v[0] + rest[0]
+ * and v[1] + rest[1]. */
 static kernel_unit_segment kernel_exact_segment(double length, const float v[2], const double rest[2])
 {
     return (kernel_unit_segment){vf_set((float)length), vf_set(v[0]), vf_set(v[1]), vf_set((float)rest[0]),

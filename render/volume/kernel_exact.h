@@ -1,5 +1,5 @@
-/* Computes in double, from the caller's coordinates and values: the ends of a ray's segment in a tet, and the map and
- * the field of other cells at single points, which kernel_map.h computes in float32. Terms:
+/* Computes in double, from the mesh's coordinates and values: the ends of a ray's segment in a tet, and the map and the
+ * field of other cells at single points, which kernel_map.h computes in float32. Terms:
  *     (u, v)          a ray's parameters in its tile: its slopes or, if the camera is orthographic, its origin
  *     t               depth: z in tile space, in scaled units
  *     domain          values are mapped to the transfer function's domain, in which its range is 0 to 1
@@ -16,18 +16,18 @@
  * that error, near an opacity of 1 by a factor of a hundred. Besides, the length of a short segment is the difference
  * of two depths that are rounded relative to the size of the scene. Which faces a ray crosses, and in which order
  * segments lie along it, is decided in float32 as for all other cells (kernel_cell.h), with bit-identical results. But
- * the segment's length, and its values at both ends, are computed in double, from the caller's coordinates and values
- * and from the ray's position in the picture.
+ * the segment's length, and its values at both ends, are computed in double, from the mesh's coordinates and values and
+ * from the ray's position in the picture.
  *
- * An edge function is affine in the ray's u and v (kernel_cell.h). So are the sum D of a face's three edge functions,
- * and the sum N of its vertices' depths, each times the opposite edge's function, and the same sum of their values:
- * nine coefficients per face, computed once per cell and window for one tet per lane; each ray gathers those of the two
- * faces that it crosses. The ray meets the face's plane at the depth N / D.
- * Because the decision that the ray crosses the face is made in float32, that point may lie outside the face: an edge
- * function there may be negative by about 1e-7 of its terms' magnitudes. If D is less than KERNEL_DOUBLE_EDGE times
- * these magnitudes, the face is seen so nearly edge on that the point may be far outside the face, and the segment
- * keeps both float32 ends. Everything is computed from the face's vertices in their order and from the ray, so that
- * both cells of a face compute the same point if both use double. */
+ * An edge function is affine in the ray's u and v (kernel_cell.h). So are three functions of a face: the sum D of its
+ * three edge functions; the sum N of its vertices' depths, each times the opposite edge's function; and the same sum of
+ * its vertices' values. They have nine coefficients, which are computed once per cell and window, one tet per lane;
+ * each ray gathers those of the two faces that it crosses. The ray meets the face's plane at the depth N / D. Because
+ * the decision that the ray crosses the face is made in float32, that point may lie outside the face: an edge function
+ * there may be negative by about 1e-7 of its terms' magnitudes. If D is less than KERNEL_DOUBLE_EDGE times these
+ * magnitudes, the face is seen so nearly edge on that the point may be far outside the face, and the segment keeps both
+ * float32 ends. Everything is computed from the face's vertices in their order and from the ray, so that both cells of
+ * a face compute the same point if both use double. */
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
@@ -46,9 +46,9 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Smallest sum of a face's edge functions, relative to the sum of their terms' magnitudes, for which the face's point
- * is used. A ray that crosses the face in float32 then meets the face's plane at most 1e-7 / KERNEL_DOUBLE_EDGE of the
- * face's extent outside the face. */
+/* Smallest sum of a face's edge functions, relative to the sum of their terms' magnitudes, for which the point where
+ * the ray meets the face's plane is used. A ray that crosses the face in float32 then meets the face's plane at most
+ * 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent outside the face. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
 /* Numbers of a face of a tet: the coefficients c, cu and cv of three affine functions c + cu u + cv v of the ray, and
@@ -85,8 +85,9 @@ static inline double kernel_double_domain(const kernel_transfer *transfer, doubl
 
 /* ---- tets, one per lane ---- */
 
-/* A vertex of each tet in tile space, for one half of the lanes. On the ray (u, v) it is projected to (x - u * depth,
- * y - v * depth). at: x, y and t; value: the field in the transfer function's domain. */
+/* A vertex of each tet in tile space, for one half of the lanes. at: x, y and t; depth: the distance from the eye's
+ * plane or, if the camera is orthographic, a constant; value: the field in the transfer function's domain. On the ray
+ * (u, v) the vertex is projected to (x - u * depth, y - v * depth). */
 typedef struct kernel_double_vertices {
     kernel_f64 at[3], depth, value;
 } kernel_double_vertices;
@@ -118,7 +119,7 @@ SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots,
     out[KERNEL_DOUBLE_LEAST][half] = least;
 }
 
-/* Computes the faces of the transformed tets. */
+/* Computes the numbers (kernel_double_face) of the four faces of each of the transformed tets. */
 static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_frame *f, const kernel_tile *tile,
                                                                   const kernel_transformed_tets *tets,
                                                                   const kernel_transfer *transfer,

@@ -71,7 +71,8 @@ SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf
     const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
     const vf end = vf_clamp((high - t->bin_low) * t->variation_inverse, begin, last);
-    /* The class of width is the number of bins that the values cover, plus 1, rounded down to quarters of an octave. */
+    /* The row of the table is the class of the range's width: the width in bins, plus 1, is rounded down to 1, 1.25,
+     * 1.5 or 1.75 times a power of two, and these numbers are the classes 0, 1, 2 and so on. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
     int32_t at[SIMD_WIDTH];
     vi_store(at, (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * KERNEL_LIGHT_ENTRIES);
@@ -79,8 +80,8 @@ SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf
 }
 #endif
 
-/* Limits of an integration step, derived at the top of this file: optical depth, depth caused by the change of
- * extinction, and relative change of 1 - opacity. */
+/* Limits of an integration step, derived at the top of this file: optical depth, optical depth caused by the change of
+ * extinction along the step, and relative change of 1 - opacity. */
 #define KERNEL_STEP_DEPTH ((kernel_real)0.35)
 #define KERNEL_STEP_CHANGE ((kernel_real)0.1)
 #define KERNEL_STEP_RATIO ((kernel_real)0.3)
@@ -115,8 +116,8 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_
     return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* The piece of the transfer function that contains each ray's current value. at: index of the piece. common: if all
- * rays have the same piece, points to it, which saves gathers; otherwise NULL. */
+/* The piece of the transfer function that contains each ray's current value. at: index of the piece. common: the
+ * entries of that piece if it is the same for all rays, which saves gathers; otherwise NULL. */
 typedef struct kernel_piece_index {
     vi at;
     const kernel_real *common;
@@ -154,8 +155,8 @@ SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_ind
     }
 }
 
-/* Returns the index of the piece that contains each ray's value x + rest. If that is the boundary of two pieces, it is
- * the upper piece or, for rays in `falling` (whose value decreases along the segment), the lower one. */
+/* Returns the index of the piece that contains each ray's value x + rest. If the value is the boundary of two pieces,
+ * the upper piece is returned or, for rays in `falling` (whose value decreases along the segment), the lower one. */
 SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest, vm falling)
 {
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
@@ -201,7 +202,7 @@ typedef struct kernel_piece_state {
     vm is_opaque;      /* the opacity is 1 on the whole step */
 } kernel_piece_state;
 
-/* Returns the state at the begin of a segment, before a piece is entered. */
+/* Returns the state at the begin of a segment, before a piece is entered (kernel_piece_state_enter()). */
 SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segment *run)
 {
     const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);

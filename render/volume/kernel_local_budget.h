@@ -2,15 +2,15 @@
  * of the error of light (docs/development/error_budget.md derives the allowed error). kernel_segments.h defines
  * segments and their units.
  *
- * Let f be the field on the ray, and v its approximation by segments, each of which is linear and has the mean of a
- * polynomial that is fitted to f. Let s be the extinction, c the colour, b the light from behind, T the transmittance
- * up to a point, and let primes be derivatives by the value. The approximation changes the light by the integral of T g
- * (v - f) along the ray, with g = (s c)' - s' b. On each segment v - f has mean zero, apart from the polynomial's own
- * error, so that only the variation of T g along the segment counts: the error is at most half the oscillation (maximum
- * minus minimum) of T g, times the integral of |v - f|. Over a range of values |g| is at most `cost`, and for fixed b g
- * varies by at most `swing` (error_variation in the code). g is linear in b, so both follow from the minimum and the
- * maximum of b (kernel_light_bounds()). Let D be the segment's optical depth and R the colours' contrast. Along the
- * segment T falls by at most min(D, 1), and b changes by at most R min(D, 1):
+ * Let f be the field on the ray, and v its approximation by segments, each of which is linear and has the same mean
+ * along its length as a polynomial that is fitted to f. Let s be the extinction, c the colour, b the light from behind,
+ * T the transmittance up to a point, and let primes be derivatives by the value. The approximation changes the light by
+ * the integral of T g (v - f) along the ray, with g = (s c)' - s' b. On each segment v - f has mean zero, apart from
+ * the polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
+ * oscillation (maximum minus minimum) of T g, times the integral of |v - f|. Over a range of values |g| is at most
+ * `cost`, and for a fixed b, g varies by at most `swing` (error_variation in the code). g is linear in b, so both
+ * follow from the minimum and the maximum of b (kernel_light_bounds()). Let D be the segment's optical depth and R the
+ * colours' contrast. Along the segment T falls by at most min(D, 1), and b changes by at most R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
@@ -145,14 +145,15 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const ker
                  vf_lt(kernel_gather_lane(b->high, p->rays.lane), high));
 }
 
-/* Errors of one segment that replaces a ray's whole interval in its cell:
+/* Parameters of the functions below. They describe the errors of one segment that replaces a ray's whole interval in
+ * its cell:
  *     mean            mean of |v - f| (top of this file); with n segments it is divided by n^2
  *     quartic         E, the bound of the quartic part of the field's deviation from its chord
  *     residual_error  error of the field that the residual of Newton's method causes
  *     weight_change   oscillation of T g that the changes of T and b along the segment cause */
 
-/* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of v
- * - f with mean zero, plus the effect of the mean errors. */
+/* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of
+ * the part of v - f that has mean zero, plus the effect of the errors of the mean. */
 SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
                                                  vf error_variation, vf cost)
 {
@@ -177,9 +178,9 @@ SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local
     return kernel_values_have_step(t, low - rounding, high + rounding);
 }
 
-/* Sets p->count, the number of segments of each ray, for an allowed error that includes the ray's absorption. length:
- * of the interval, in unit distances; least: lower limit of the number. Returns the rays for which no number is enough.
- */
+/* Sets p->count, the number of segments of each ray, for an allowed error that grows with the absorption in the
+ * interval. length: length of the interval, in unit distances; least: lower limit of p->count. Returns the rays for
+ * which no number of segments is accurate enough. */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_frame *f, int volume, vf mean, vf quartic,
                                                                 vf residual_error, vf weight_change, vf length,
                                                                 vf least, kernel_local_pairs *p)
@@ -215,9 +216,9 @@ SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pa
     return p->share > KERNEL_LOCAL_LEAST_SHARE ? vf_lt(vf_set(4), wanted) : vm_none();
 }
 
-/* Sets p->count, the number of segments of each ray; returns the rays for which no number is enough. It first tests
- * whether one segment is enough, with the bounds over all of the cell's values, and the error that is allowed for the
- * ray's length alone. Only other rays use kernel_local_count_by_depth(). */
+/* Sets p->count, the number of segments of each ray; returns the rays for which no number of segments is accurate
+ * enough. It first tests whether one segment is accurate enough, with the bounds over all of the cell's values, and the
+ * error that is allowed for the ray's length alone. Only other rays use kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_count(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
                                   kernel_local_pairs *p)
 {

@@ -31,7 +31,7 @@
  * max_error L / reach, where reach is the length of the longest ray, times the transmittance in front of the segment:
  * summed over a ray at most 0.2 max_error. If the error is larger, the segment is divided into subintervals over which
  * the value changes by equal amounts; the error of the absorption falls with the square of their number. If too many
- * would be needed, or a bin is too wide, kernel_integrate() computes the segment. */
+ * subintervals would be needed, or a bin is too wide, kernel_integrate() computes the segment. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 
@@ -47,8 +47,8 @@ typedef struct kernel_preint_end {
     /* bin: index of the bin; position: position within the bin, from 0 to 1, or outside this range in the first and the
      * last bin */
     vf value, bin, position;
-    /* own: the bin's integrals of extinction and emission in three channels, in integer units; table_error: their error
-     * bound, as light */
+    /* own: the integrals over this bin of the extinction and of the emission in three channels, in integer units;
+     * table_error: bound of the light's error that they cause, per unit distance */
     vf own[4], table_error;
     /* before: the integrals over all earlier bins, in the same units; colour: packed colour at the bin's middle */
     vi before[4], colour;

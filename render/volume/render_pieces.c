@@ -284,7 +284,7 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
     }
 }
 
-/* ---- how bounds vary ----
+/* ---- bounds of the effect of field errors on light ----
  *
  * A field error d changes the light by T d g per unit distance, where T is the transmittance, s the extinction, c a
  * channel of the colour, primes are derivatives by the value, and g = s' (c - b) + s c'. The light b from behind lies
@@ -317,8 +317,8 @@ static void unite_variations(value_variation *a, const value_variation *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the ranges of g so that they hold between the values `from` and `to` of the piece p, too. behind: the minimum
- * and maximum of the light from behind. */
+/* Widens the ranges of g and of the extinction so that they hold between the values `from` and `to` of the piece p,
+ * too. behind: the minimum and maximum of the light from behind. */
 static void variation_in_piece(value_variation *variation, const kernel_real *p, double from, double to,
                                const double behind[2])
 {
@@ -346,8 +346,8 @@ static void variation_in_piece(value_variation *variation, const kernel_real *p,
 }
 
 /* Computes the ranges of g over a bin of values, and a little beyond its ends; the first and the last bin include
- * everything beyond them. piece: no earlier piece reaches the bin. Returns the first piece that reaches the bin, from
- * which the search for the next bin's pieces begins. */
+ * everything beyond them. piece: index of a piece, in front of which no piece reaches the bin. Returns the index of the
+ * first piece that reaches the bin, from which the search for the next bin's pieces begins. */
 static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
                             value_variation *variation)
 {

@@ -16,7 +16,7 @@ enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 
 /* Upper bound of the integrals over all bins, in the integer units in which they are stored, so that differences fit in
  * 32 bits. */
 static const double most_units = 0x1p30;
-static const double steepest = 1e6; /* same value as KERNEL_OPAQUE in kernel_integral.h */
+static const double steepest = 1e6; /* upper limit of extinctions; same value as KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
 /* Returns the number of bins for the allowed error of a ray's light (max_error). Only segments whose end values differ
@@ -295,7 +295,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    /* with a nonlinear scale pieces cannot be exact, and this tolerance replaces the one for dropped colours */
+    /* with a nonlinear scale pieces cannot be exact; the tolerance then limits their extinction's relative error */
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
