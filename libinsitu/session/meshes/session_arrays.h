@@ -11,11 +11,12 @@ enum {
     SESSION_ALLOW_FLOATS = 1,
     SESSION_ALLOW_INTEGERS = 2,
     SESSION_IS_OPTIONAL = 8,
-    SESSION_HAS_END = 16,   /* the array has one element more than its count, as arrays of offsets have */
+    /* the array has one element more than session_array_rule.count, as arrays of offsets have */
+    SESSION_HAS_END = 16,
     SESSION_ALLOW_ANY = 32, /* all integer types are allowed, and arrays of any type may be unaligned */
 };
 
-/* The requirements of an array. */
+/* The requirements that an array given by the caller must meet. */
 typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
     int64_t count; /* number of elements that the array must have, not counting the additional one of SESSION_HAS_END */
@@ -31,13 +32,13 @@ typedef struct session_array_rule {
 insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                   base_error *error);
 
-/* Checks an array of pointers in the same way as session_check_array(). It must be given; its type is the type of the
- * elements to which the pointers point. */
+/* Checks an array of pointers in the same way as session_check_array(). The array of pointers must be given.
+ * array->type is the type of the elements to which the pointers point. */
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                      base_error *error);
 
-/* Checks the stride between the components of a tuple in `data`. is_any_stride: a stride of any size is allowed. name:
- * the word for components in messages. */
+/* Checks the stride between the components of a tuple in `data`. count: number of components. is_any_stride: the stride
+ * need not be a multiple of the element size. name: the word for components in messages. */
 insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_any_stride,
                                        const char *name, base_error *error);
 

@@ -4,28 +4,28 @@
  * A reference cell is a product of simplices: a hex of three lines, a wedge of a triangle and a line; a tet is a single
  * simplex. In each simplex, polynomials of order p are written in Bernstein form. The second derivative along an edge
  * of the simplex is then a weighted mean of p (p - 1) times the second differences of the coefficients along that edge.
- * Therefore its absolute value is at most M, the largest of these in absolute value.
+ * Therefore its absolute value is at most M, the largest absolute value of p (p - 1) times a second difference.
  *
  * A piece is a simplex whose edges are 1 / m of those of the cell. Let u be the difference between the polynomial and
  * its linear interpolation in a piece, l_i the barycentric coordinates in the piece, and e_ij the edge of the cell that
  * is parallel to the piece's edge from corner i to corner j. Let B_ij be a number that is at least minus the second
  * derivative of u along e_ij. Let q be half the sum of B_ij l_i l_j / m^2 over all pairs of corners. Then q - u has
  * second derivatives of at most 0 along all edges, and is 0 at the corners. So it is not negative on the edges. It is
- * then not negative on the faces, because lines parallel to an edge cross them from edge to edge, and likewise not
- * inside. So u is at most the largest value of q. The same holds for -u with B_ij of the opposite sign. If all B_ij are
- * M, the largest value of q is K M / m^2, with K = 1/8 on a line, 1/6 in a triangle and 3/16 in a tet. For polynomials
- * of order 2 the bounds are exact.
+ * then not negative on the faces either, because a line that is parallel to an edge crosses a face from one of its
+ * edges to another one. For the same reason it is not negative inside. So u is at most the largest value of q. The same
+ * holds for -u with B_ij of the opposite sign. If all B_ij are M, the largest value of q is K M / m^2, with K = 1/8 on
+ * a line, 1/6 in a triangle and 3/16 in a tet. For polynomials of order 2 the bounds are exact.
  *
  * A tet is cut into smaller tets and octahedra, and each octahedron into tets along a diagonal. So the pieces of a tet
  * have five shapes, whose edges have seven directions.
  *
- * In a product of simplices, interpolation in one factor does not increase the differences in the others, so that the
- * bounds of all factors are added up.
+ * In a product of simplices, linear interpolation along one factor does not increase the differences along the others.
+ * Therefore the bounds of all factors are added up.
  *
  * The isosurface of the pieces is at x_m(a) with f_m(a) = v. Here a is a point of the reference cell, v the isovalue,
  * x_m and f_m the interpolated position and field, and x and f their polynomials. x(a) differs from x_m(a) by at most
- * the positions' bound. There f differs from v by at most the field's bound. So the isosurface of f is at most the
- * field's bound, divided by the length of the gradient, away from x(a). A lower bound of this length is computed for
+ * the positions' bound. f(a) differs from v by at most the field's bound. So the distance from x(a) to the isosurface
+ * of f is at most the field's bound divided by the length of the gradient. A lower bound of this length is computed for
  * each piece that may be crossed, from the gradients at its corners: it is the least component of these gradients along
  * their mean, because no weighted mean of these gradients is shorter. The difference between the gradient in a piece
  * and such a mean depends on third derivatives and the square of the size of pieces, and is neglected. */
@@ -202,6 +202,8 @@ static bool fill_level(node_lists *lists, int level, int order, session_bound_fa
     return is_made;
 }
 
+/* Computes out->bernstein, the matrix from values at the cell's nodes to Bernstein coefficients, and lists the second
+ * differences of these coefficients. */
 static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
 {
     const int count = lists->count;
@@ -258,11 +260,13 @@ static int count_factors(int type)
     return type == GRID_HEX ? 3 : type == GRID_QUAD || type == GRID_WEDGE ? 2 : 1;
 }
 
+/* Returns a factor of the reference cell by its index. A triangle or tet is factor 0; all other factors are lines. */
 static const session_bound_factor *factor_of(const session_bound *of, int factor)
 {
     return factor == 0 && of->simplex.dimensions ? &of->simplex : &of->line;
 }
 
+/* Makes the finer lattices. Their orders are multiples of the cell's order. */
 static bool make_levels(session_bound *out)
 {
     const int type = out->lattice.type, p = out->lattice.order;
@@ -331,6 +335,7 @@ size_t session_bound_work_size(const session_bound *of)
     return SIZE * (2 * nodes + 6 * fine) + 3 * fine;
 }
 
+/* Assigns sections of the working memory `work` to the arrays of the job. */
 static void divide_work(bound_job *job, double *work)
 {
     const size_t nodes = SIZE * (size_t)job->of->lattice.count, fine = SIZE * (size_t)job->of->levels[job->level].count;
@@ -343,7 +348,7 @@ static void divide_work(bound_job *job, double *work)
     job->work = work + 3 * job->of->levels[job->level].count;
 }
 
-/* Multiplies an array of tuples, of `size` doubles each, by one matrix for each factor of the reference cell. If
+/* Multiplies an array of tuples, of `size` doubles each, by matrices[f] along each factor f of the reference cell. If
  * is_fine is set, the matrices give tuples at the nodes of the finer lattice; otherwise they give as many tuples as the
  * cell has nodes. */
 static void multiply_by_matrices(const bound_job *job, int size, const double *const matrices[3], bool is_fine,
@@ -387,6 +392,7 @@ static double largest_q_in_tet(const double b[6])
     return is_inside && sum > 0 ? 0.25 / sum : 0;
 }
 
+/* Returns the largest value of q in a tet, including its faces and edges. b: as in largest_q_in_tet(). */
 static double largest_q_in_shape(const double b[6])
 {
     static const int faces[4][3] = {{0, 1, 3}, {0, 2, 4}, {1, 2, 5}, {3, 4, 5}};
@@ -424,8 +430,8 @@ typedef struct bound_sums {
     double above[SIZE], below[SIZE];
 } bound_sums;
 
-/* Adds the bounds of u (top of the file) for one factor of the reference cell. inner: number of doubles from one
- * coefficient of the factor to the next. */
+/* Adds the bounds of u and of -u (top of the file) for one factor of the reference cell to *sums. inner: number of
+ * doubles from one coefficient of the factor to the next. */
 static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->lattice.count;
@@ -522,6 +528,7 @@ static void find_gradient(const bound_job *job, int node, double out[3])
     for (int x = 0; x < 3; x++) out[x] = (a[3] * bc[x] + b[3] * ca[x] + last * ab[x]) / volume;
 }
 
+/* Computes the tuples, their derivatives and the field's gradient at all nodes of the finer lattice that is used. */
 static void find_gradients(bound_job *job)
 {
     const session_bound *of = job->of;
@@ -562,6 +569,7 @@ static double least_gradient(const bound_job *job, const int *corners, int count
     return isfinite(length) && least > 0 ? least : 0;
 }
 
+/* Computes out->is_crossed and out->surface_error as described at the top of the file. */
 static void bound_isosurface(bound_job *job, session_cell_bound *out)
 {
     const session_bound_level *level = &job->of->levels[job->level];
@@ -645,10 +653,10 @@ typedef struct difference_means {
     double mean, square;
 } difference_means;
 
-/* Returns the means of u and its square over a piece of a simplex. second: second derivatives of u along the edges of
- * the piece, in the order of list_differences(). Let l_i be the barycentric coordinates in the piece, numbered by its
- * corners i. Then u is half the sum of -second l_i l_j over the edges from i to j, and the means of products of the l_i
- * are known. */
+/* Returns the means of u and its square over a piece of a simplex. second: the second derivative s_ij of u along each
+ * edge of the piece, from corner i to corner j, in the order of list_differences(). Let l_i be the barycentric
+ * coordinates in the piece. Then u is half the sum of -s_ij l_i l_j over all edges, and the means of products of the
+ * l_i are known. */
 static difference_means find_means(int dimensions, const double *second)
 {
     static const int edge_counts[] = {0, 1, 3, 6};
@@ -696,11 +704,11 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
     return (difference_means){out.mean / fmax(1, count), out.square / fmax(1, count)};
 }
 
-/* Returns the root mean square of the error of the field in the pieces of a cell, if the cell has one piece between two
- * nodes (m = 1). At a point of space, the error is, to first order, u of the values minus the gradient times u of the
- * positions (u is defined at the top of the file). The second derivatives of u are approximated by second differences
- * of the coefficients. It is assumed that tets from octahedra have the same shape as the other tets, and that the
- * differences of the factors are independent. coefficients: working memory with one number per node. */
+/* Returns the root mean square of the error of the field in a cell, if the whole cell is one piece (m = 1). At a point
+ * of space, the error is, to first order, u of the values minus the gradient times u of the positions (u is defined at
+ * the top of the file). The second derivatives of u are approximated by second differences of the coefficients. It is
+ * assumed that tets from octahedra have the same shape as the other tets, and that the differences of the factors are
+ * independent. coefficients: working memory with one number per node. */
 static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
 {
     double mean = 0, variance = 0;

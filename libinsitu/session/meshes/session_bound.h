@@ -1,7 +1,8 @@
-/* Computes two bounds for cells of higher order, which are drawn as linear pieces: the distance between the isosurfaces
- * of the polynomials and of the pieces, and the distance between positions in the curved cell and in its pieces. The
- * row of a cell is its list of nodes in the connectivity (session_rows.h). A complete cell has all nodes of the regular
- * grid of its order (session_nodes.h). */
+/* Cells of higher order are drawn as linear pieces. Upper bounds of two distances that result from this are computed
+ * here: the distance between the isosurfaces of a cell's polynomial and those of its pieces, and the distance between
+ * the positions that the curved cell and its pieces give to the same point of the reference cell. The row of a cell is
+ * its list of nodes in the connectivity (session_rows.h). A complete cell has all nodes of the regular grid of its
+ * order (session_nodes.h). */
 #ifndef SESSION_BOUND_H
 #define SESSION_BOUND_H
 
@@ -56,21 +57,22 @@ typedef struct session_bound {
     double *collapse;
     int axis_count; /* number of axes of the reference cell, 2 or 3 */
     int level_count;
-    /* finer lattices that may be used; the order of each is twice that of the one before */
+    /* the finer lattices, one of which is chosen by the parameter `level` of session_bound_cell(); the order of each is
+     * twice that of the one before */
     session_bound_level levels[BOUND_MOST_LEVELS];
     /* The factors of which the cell is a product. line: used for the axes of hexes, quads and pyramids and for axis k
      * of wedges; simplex: a triangle, used for triangles and wedges, or a tet, used for tets */
     session_bound_factor line, simplex;
 } session_bound;
 
-/* Makes the matrices and patterns for cells of one type and number of nodes. Their order must be from 1 to
- * BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for pyramids. order: the order in which nodes are stored in
- * connectivity. is_lobatto: nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are
- * equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
+/* Makes the matrices and patterns for cells of one type and number of nodes. The polynomial order of the cells must be
+ * from 1 to BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for pyramids. order: the order in which a cell's nodes
+ * are listed in the connectivity. is_lobatto: nodes along the axes of hexes and quads are Gauss-Lobatto points;
+ * otherwise they are equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
 void session_drop_bound(session_bound *bound);
 
-/* The isosurfaces of one field. */
+/* The isovalues of the isosurfaces of one field. */
 typedef struct session_isovalues {
     int count;
     const double *values;
@@ -96,8 +98,10 @@ typedef struct session_cell_bound {
     /* set if the cell may contain a part of an isosurface, or if no isovalues are given. It is false if a value or a
      * position is not finite; all other members are then undefined. */
     bool is_crossed;
-    double node_distance;  /* distance between neighbouring nodes: the root mean square over the cell's edges */
-    double position_error; /* upper bound of the distance between positions in the cell and in its pieces */
+    double node_distance; /* distance between neighbouring nodes: the root mean square over the cell's edges */
+    /* upper bound of the distance between the positions that the cell and its pieces give to the same point of the
+     * reference cell */
+    double position_error;
     /* upper bound of the distance between the isosurfaces of the cell and of its pieces; INFINITY if the gradient may
      * vanish near the isosurface */
     double surface_error;

@@ -103,7 +103,8 @@ static void find_field_problem(const session_parts *parts, const session_field *
     }
 }
 
-/* Iterator over the fields of the parts. Each field is visited once, with the first part that has it. */
+/* Iterator over the fields of the parts. Each field is visited once, on the first part that has it. part, next: index
+ * of the part, and of the field on this part, at which the search for the next field begins. */
 typedef struct field_visit {
     const session_parts *parts;
     int part, next;

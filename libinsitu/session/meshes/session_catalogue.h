@@ -25,9 +25,11 @@ typedef struct session_catalogue_field {
 /* A hanging vertex: a vertex that lies on a face of a coarser cell without being a corner of this face. Its value is
  * the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
-    int64_t group;      /* index of its group of equal vertices (session_vertex_groups) */
-    int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
-    double weights[4];  /* weight of the value at each corner; the weights sum to 1 */
+    int64_t group; /* index of its group of equal vertices (session_vertex_groups) */
+    /* for each corner of the face, the index of its group of equal vertices or, if is_received is set, the index of its
+     * value among the values received from other ranks */
+    int64_t corners[4];
+    double weights[4]; /* weight of the value at each corner; the weights sum to 1 */
     bool is_received; /* set if `corners` are indices of values received from other ranks, not of groups of this rank */
 } session_hanging_vertex;
 
@@ -38,8 +40,8 @@ typedef struct session_twin {
     double position[3]; /* lexicographically smallest position of the vertex and all vertices that coincide with it */
 } session_twin;
 
-/* The outer faces of a part of a mesh on this rank, and the vertices of outer faces. Other cells' vertices may hang on
- * these faces. The data is kept if only coordinates change. */
+/* The outer faces of a part of a mesh on this rank, and the vertices that may hang on outer faces. The data is kept if
+ * only coordinates change. */
 typedef struct session_border {
     /* session_catalogue_mesh.cells_hash at the time when the border was computed; 0: not computed yet */
     uint64_t cells_hash;
@@ -52,8 +54,8 @@ typedef struct session_border {
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
 } session_border;
 
-/* This rank's hanging vertices in the meshes of a mesh group, and the values that it sends to other ranks for their
- * hanging vertices. */
+/* This rank's hanging vertices in the meshes of a mesh group, and the values that this rank sends to other ranks for
+ * their hanging vertices. */
 typedef struct session_hanging {
     /* session_mesh_group.positions_hash at the time when this struct was computed; 0: not computed yet */
     uint64_t positions_hash;
@@ -108,11 +110,11 @@ typedef struct session_catalogue_mesh {
     base_error *fault;
     int field_count;
     session_catalogue_field *fields;
-    /* if the mesh has vertex ids: name of the mesh group that contains only this mesh (session_mesh_group.name);
+    /* if the mesh has vertex ids: the hash that identifies the mesh group of this mesh alone (session_mesh_group.name);
      * otherwise 0 */
     uint64_t single_group_name;
-    /* sums over all ranks of hashes of the stamps at which cells (cells_hash) and coordinates (positions_hash) last
-     * changed; 0: not computed yet */
+    /* sums over all ranks of hashes of session_mesh.cells_stamp (cells_hash) and of session_mesh.coordinates_stamp
+     * (positions_hash), which show when cells and coordinates last changed; 0: not computed yet */
     uint64_t cells_hash, positions_hash;
     /* the home ranks (session_homes.h) of vertices and faces of this mesh; valid if computed for the current
      * positions_hash */
@@ -145,7 +147,8 @@ typedef struct session_catalogue {
     bool are_derived;        /* set if the catalogue contains the derived fields of the current scene */
     bool are_meshes_grouped; /* set if the mesh groups are those of the current scene */
     bool are_hashes_known;   /* set if the meshes' hashes of cells and positions are up to date */
-    /* error for which no image can be drawn: it belongs to no known mesh, or memory ran out on some rank; NULL: none */
+    /* error because of which no image can be drawn: it belongs to no known mesh, or memory ran out on some rank; NULL:
+     * there is none */
     base_error *fault;
     int mesh_count, mesh_group_count;
     session_catalogue_mesh *meshes;
@@ -174,14 +177,15 @@ static inline bool session_catalogue_has_higher_order(const session_catalogue *c
     return is_any;
 }
 
-/* Returns the name of the mesh group over which values on this mesh are averaged: if the mesh has vertex ids, the group
- * of this mesh alone; otherwise mesh_group_name, which is the name stored in the layer's field. */
+/* Returns the hash that identifies the mesh group over which values on this mesh are averaged
+ * (session_mesh_group.name). If the mesh has vertex ids, it is that of the group of this mesh alone; otherwise it is
+ * mesh_group_name, the hash stored in the layer's field. */
 static inline uint64_t session_find_group_name_of_mesh(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
 {
     return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;
 }
 
-/* Returns the mesh group with this name, or NULL if there is none. */
+/* Returns the mesh group with this hash as its `name`, or NULL if there is none. */
 session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name);
 void session_drop_mesh_groups(session_catalogue *catalogue);
 /* Frees the data of the hanging vertices and, if with_borders is set, the borders. */
@@ -191,7 +195,8 @@ void session_hanging_free(session_hanging *hanging, bool with_borders);
 typedef struct session_mesh_group_parts {
     int count;                  /* number of this rank's parts */
     const session_mesh **items; /* the parts, owned by session_meshes */
-    int *first_parts;           /* for each mesh of the group, index of its first part in `items`; then `count` */
+    /* for each mesh of the group, index of its first part in `items`; a final entry is `count` */
+    int *first_parts;
 } session_mesh_group_parts;
 
 /* Lists this rank's parts of the mesh group's meshes. Returns false if memory runs out; then nothing needs to be
@@ -202,7 +207,8 @@ void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 
-/* Returns a hash of this rank's table of names. Two ranks have the same hash if their tables are equal. Local. */
+/* Returns a hash of this rank's table of meshes and fields (session_catalogue.c). Two ranks have the same hash if their
+ * tables are equal. Local. */
 uint64_t session_hash_names(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. derived: index of the field

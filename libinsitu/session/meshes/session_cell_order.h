@@ -16,8 +16,8 @@ const signed char *session_vertex_permutation(insitu_vertex_order order, int typ
  * unchanged, and cells with bad offsets keep their order, because session_check.c reports these errors. Local. */
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Permutes the entries of `out` in place. These are one entry for each vertex of each cell, `entries` in total, and are
- * permuted within each cell from the caller's vertex order to VTK's. A second call restores the caller's order. */
+/* Changes the order of the entries of `out` within each cell, in place, from the caller's vertex order to VTK's. `out`
+ * has one entry for each vertex of each cell, `entries` in total. A second call restores the caller's order. */
 void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
 
 #endif

@@ -29,8 +29,8 @@
  * other; an edge from a vertex to itself bounds nothing and is skipped. */
 
 typedef struct face_edge {
-    int64_t low, high, face; /* low, high: the edge's vertices, smaller index first; face: a face that has the edge.
-                                Indices are those of the caller's connectivity. */
+    /* low, high: the edge's vertices, smaller index first; face: a face that has the edge. Indices count from 0. */
+    int64_t low, high, face;
 } face_edge;
 
 /* A buffer of one thread, which is enlarged if necessary. It must be zero-initialized. */
@@ -53,7 +53,7 @@ typedef enum face_fault {
 
 typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
-    int64_t face;          /* index of the faulty face, as stored in the connectivity */
+    int64_t face;          /* index of the faulty face, counted from 0 */
     int64_t first, end;    /* start and end of the face's vertices in face_connectivity */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
@@ -206,7 +206,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 typedef struct fault_details {
     int type;
     int64_t first, end; /* start and end offset of the cell */
-    int64_t vertex;     /* index of the faulty vertex, as stored in the connectivity */
+    int64_t vertex;     /* index of the faulty vertex, counted from 0 */
     double position[3];
     face_fault fault_of_faces;
     face_fault_details faces;
@@ -389,7 +389,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     return describe_faces(mesh, cell, FACES_NO_MEMORY, &details.faces, error);
 }
 
-/* Checks cells of any layout one by one. */
+/* Checks the cells begin .. end - 1, which may have any layout, one by one, and adds the valid ones to *tally. Returns
+ * the first invalid cell, or `end` if all are valid. */
 static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, edge_buffer *buffer,
                                       mesh_tally *tally)
 {
@@ -469,8 +470,9 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
-/* Reports the first drawn cell of a volume type in a mesh without z coordinates, in which such a cell has no volume.
- * Only mixed cells are checked here, because insitu_set_mesh() checks the type of all others. */
+/* Reports an error if a mesh without z coordinates has a drawn cell of a volume type, because such a cell has no
+ * volume. The message names the first such cell. Only mixed cells are checked here, because insitu_set_mesh() checks
+ * the type of all others. */
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;

@@ -21,6 +21,7 @@ typedef struct conform_array {
     int64_t index_limit; /* an upper bound of valid indices, if the array contains indices */
 } conform_array;
 
+/* Returns the mesh's array with this number, 0 .. SESSION_CONFORMED - 1. */
 static conform_array find_array(insitu_mesh *m, int number)
 {
     const int64_t open = m->open_offsets ? 0 : 1,
@@ -170,9 +171,9 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* If the array with index `number` in the list of the mesh's arrays cannot be read in place, makes the description
- * refer to a copy of it. If is_kept is set, the copy of the previous description is used again; otherwise a new one is
- * allocated. Returns false if memory runs out. */
+/* If the array that find_array() returns for `number` cannot be read in place, makes the description `given` refer to a
+ * copy of it. If is_kept is set, the copy in *last, which was made for the previous description, is used again;
+ * otherwise a new one is allocated. Returns false if memory runs out. */
 static bool replace_array_by_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given,
                                   session_conformed *out)
 {

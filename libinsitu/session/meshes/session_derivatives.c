@@ -10,7 +10,8 @@
  * line's.
  *
  * In finer lattices (session_finer.h) the polynomials have a lower order than the lattice, and are determined by fewer
- * nodes: only those whose indices are multiples of `parts`. Therefore the sums have few terms.
+ * nodes: only those whose lattice indices are multiples of `parts`, the number of segments of the finer lattice between
+ * two of the cell's own nodes. Therefore the sums have few terms.
  *
  * Serendipity cells lack the nodes in the middle of faces and cells. Their polynomials are those of complete cells of
  * order 2 if the value at a missing node is computed from other nodes. The value at the middle of a face is half the
@@ -70,6 +71,7 @@ void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODE
     }
 }
 
+/* Computes list->lines, the derivatives of the Lagrange polynomials of a line at its nodes. */
 static void compute_line_derivatives(term_list *list, bool is_lobatto)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
@@ -162,7 +164,7 @@ static void add_term(term_list *list, int i, int j, int k, double weight)
 }
 
 /* Adds the terms of the derivative at a node along an axis of the lattice. `at` are the lattice indices of the node.
- * The terms are those of the nodes on the line through this node along the axis. */
+ * The sum has a term for each node of the polynomial on the line through this node along the axis. */
 static void add_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};
@@ -193,6 +195,7 @@ static void add_barycentric(term_list *list, const int b[4], int coordinate, int
             }
 }
 
+/* Adds the terms of the derivative along an axis of the reference cell at the node with the lattice indices `at`. */
 static void add_derivative(term_list *list, const int at[3], int axis)
 {
     const int p = list->of->order, type = list->of->type;

@@ -20,10 +20,11 @@ typedef struct session_derivatives {
     double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
 } session_derivatives;
 
-/* Computes the derivatives of the shape functions of a type of cell at its nodes. is_lobatto: whether the nodes along
- * edges are Gauss-Lobatto points; otherwise they are equispaced. parts: the cell may have more nodes than its
- * polynomial needs; along each axis every parts-th node determines the polynomial. For serendipity cells, parts
- * must be 1. Returns false if memory runs out; the caller must drop *out in any case. */
+/* Computes the derivatives of the shape functions of a type of cell at its nodes. order: the order in which a cell's
+ * nodes are listed in the connectivity. is_lobatto: the nodes along edges are Gauss-Lobatto points; otherwise they are
+ * equispaced. parts: the cell may have more nodes than its polynomial needs; along each axis every parts-th node
+ * determines the polynomial. For serendipity cells, parts must be 1. Returns false if memory runs out; the caller must
+ * drop *out in any case. */
 bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
@@ -35,8 +36,8 @@ bool session_has_two_spacings(const session_nodes *of);
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
 void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
 
-/* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns the number of
- * directions: 2 at the middle of a face, 3 at the middle of a hex. */
+/* Finds the directions from a node that a serendipity cell lacks to the nodes around it. at: lattice indices of the
+ * missing node. Returns the number of directions: 2 at the middle of a face, 3 at the middle of a hex. */
 int session_find_missing_node_directions(int type, const int at[3], int directions[3][3]);
 
 /* The derivatives of the polynomials of all cells of a mesh whose cells of higher order are split into linear

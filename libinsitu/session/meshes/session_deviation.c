@@ -160,11 +160,11 @@ static void measure_values(const deviation_work *w, const session_bound *of, int
     if (bound.is_crossed) request->use_cell(request->of_values, &read);
 }
 
-/* Returns the estimated number of pixels in which an isosurface is seen in a cell, in units of 1/16 of a pixel. A plane
- * with a random position and direction that crosses a cell has the mean area V / B in it, where V is the cell's volume
- * and B its mean width. A quarter of the area of a closed surface is seen: the projected area is half of the area in
- * the mean, and half of the surface is behind. The result is a whole number, so that sums over cells do not depend on
- * their order. size: the size of a pixel. */
+/* Returns the estimated number of pixels in which an isosurface is seen in a cell, in units of 1/16 of a pixel. If a
+ * plane with a random position and direction crosses a cell, the part of the plane in the cell has the mean area V / B,
+ * where V is the cell's volume and B its mean width. A quarter of the area of a closed surface is seen: on average the
+ * projected area is half of the area, and the front half of the surface hides the back half. The result is a whole
+ * number, so that sums over cells do not depend on their order. size: the size of a pixel. */
 static int64_t estimate_area(const session_cell_bound *bound, const session_nodes *of, double size)
 {
     /* area V / (4 B) of regular cells whose edges have the length 1, by cell type; V and B are explained above */

@@ -7,7 +7,7 @@
 #include "session_finer.h"
 #include "session_rows.h"
 
-/* Computes the size of a pixel in the views that show a mesh. */
+/* Callback that computes the size of a pixel in the views that show a mesh. */
 typedef struct session_pixels {
     const void *of; /* the state that is passed to size() */
     /* Returns a lower bound of the size of a pixel at any point of a sphere, in units of coordinates; INFINITY if no
@@ -64,8 +64,8 @@ typedef struct session_deviation {
     double low, high; /* if is_of_values: the range of the values at nodes */
 } session_deviation;
 
-/* Measures the caller's cells of a mesh with cells of higher order, except ghosts. Combines the result with *out, and
- * sets the marks. Parallel. Local. */
+/* Measures the caller's cells of a mesh with cells of higher order, except ghosts. Combines the result with the results
+ * of earlier calls in *out, and sets the marks of the request. Parallel. Local. */
 insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
                                         session_deviation *out, base_error *error);
 

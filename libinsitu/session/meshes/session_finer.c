@@ -135,7 +135,8 @@ static void read_vertex(const void *of, int64_t position, double *tuple)
     grid_vertex(of, position, tuple);
 }
 
-/* Finds where the nodes of each cell begin, and the cells' types if they differ. */
+/* Computes the number of nodes of the finer lattices. Unless all cells are refined and of one kind, also stores the
+ * index of each cell's first node and each cell's type. */
 static bool number_nodes(finer_work *w, session_finer *finer)
 {
     const int64_t cells = w->rows.cells.cell_count;
@@ -414,8 +415,8 @@ void session_free_choices(session_finer_choice *choices, int count)
     base_free(choices);
 }
 
-/* Adds the number of bytes that the finer lattices of `cells` cells take if each edge between two nodes is cut into
- * `parts` parts: the nodes, 4 bytes for each vertex of a piece, and 4 for each piece to store its cell. */
+/* Adds to *out the number of bytes that the finer lattices of `cells` cells take if each edge between two nodes is cut
+ * into `parts` parts: the nodes, 4 bytes for each vertex of a piece, and 4 for each piece to store its cell. */
 static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
     const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;

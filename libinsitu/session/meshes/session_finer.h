@@ -3,7 +3,7 @@
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
  * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads these
  * cells in place of the caller's: it splits them into linear pieces and finds their gradients. Their indices are those
- * of the caller's cells. Each cell has its own nodes. On a face that several cells have in common, the coordinates of
+ * of the caller's cells. Cells do not share nodes. On a face that several cells have in common, the coordinates of
  * their nodes are bitwise equal (session_interpolation.h), so that equal nodes are found by their coordinates. In this
  * file, members and parameters named `parts` are the number n; a part of a mesh is one rank's part, or one block of it
  * (session_mesh.h). */
@@ -32,8 +32,8 @@ typedef struct session_cell_marks {
     session_piece_set pieces; /* the pieces that are made of refined cells; empty if session_finer_choice.parts is 1 */
 } session_cell_marks;
 
-/* Counts of a mesh's cells of higher order over all ranks, and the chosen number of pieces along their edges. All
- * members except the marks are the same on every rank. */
+/* Counts of a mesh's cells of higher order over all ranks, and the chosen number of parts between two nodes of an edge.
+ * All members except the marks are the same on every rank. */
 typedef struct session_finer_choice {
     int order; /* highest order of its cells; 0: no rank has cells of higher order */
     int64_t serendipity_count, shell_count;
@@ -73,7 +73,7 @@ static inline session_cell_marks *session_get_marks_of_part(const session_finer_
 }
 
 /* Adds to out[n] the size in bytes of the mesh's finer lattices if marked cells have n parts between two nodes and all
- * other cells have one part. n is 2 .. FINER_MOST_PARTS. marks: NULL: all cells are marked. Local. */
+ * other cells have one part. n is 2 .. FINER_MOST_PARTS. If marks is NULL, all cells count as marked. Local. */
 void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 

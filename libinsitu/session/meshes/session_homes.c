@@ -15,6 +15,7 @@ enum { MOST_SAMPLES = 1024 };
 typedef struct rank_part {
     session_box box;
     int64_t first_id; /* first id of the range of ids whose home is this rank */
+    /* nonzero if this rank has vertices with global ids, and first_id is set */
     int64_t has_ids;
 } rank_part;
 

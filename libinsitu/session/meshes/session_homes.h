@@ -46,9 +46,9 @@ typedef struct session_homes {
 
 void session_homes_free(session_homes *homes);
 
-/* Computes the homes. meshes: this rank's parts, or NULL for a mesh of which this rank has no part; several meshes are
- * treated as one. by_id is allowed only for a single mesh. half_diagonal: half of the diagonal of the scene's bounds.
- * Collective; all ranks return the same status. */
+/* Computes the homes. meshes: this rank's parts; an entry is NULL if this rank has no part of that mesh. Several meshes
+ * are treated as one. by_id is allowed only for a single mesh. half_diagonal: half of the diagonal of the scene's
+ * bounds. Collective; all ranks return the same status. */
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
@@ -59,7 +59,8 @@ bool session_is_in_box(const session_box *box, const double point[3]);
 bool session_is_in_other_box(const session_homes *homes, const double point[3]);
 
 /* Returns the home rank of an item. points: positions of the item's vertices (at least one), which lie in this rank's
- * box. id: least id of its vertices, used if homes are found by ids; otherwise the hash selects the home. */
+ * box. id: smallest global id of the item's vertices, used if homes->by_id is set. hash: hash of the item, which
+ * selects the home otherwise. */
 int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
 
 #endif

@@ -8,16 +8,16 @@
  *     pyramid    pyramid
  *     triangle   triangle
  *
- * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, only from the
- * face's nodes, in an order that follows from the positions of the face's corners. The origin is the corner with the
- * lexicographically smallest position, and the first axis leads to that neighbouring corner whose position is smaller.
- * Then nodes on an edge are computed only from the edge's nodes, beginning at the end with the smaller position, and
- * the cell's own nodes are copied. All cells that share a face or an edge compute its nodes in the same way, on all
- * ranks.
+ * The bits of a sum depend on the order of its terms. So the values at nodes on a face are computed a second time, only
+ * from the values at the face's nodes, in an order that follows from the positions of the face's corners. The origin is
+ * the corner with the lexicographically smallest position, and the first axis leads to that neighbouring corner whose
+ * position is smaller. Then the values at nodes on an edge are computed only from the values at the edge's nodes,
+ * beginning at the end with the smaller position, and the values at the cell's own nodes are copied. All cells that
+ * share a face or an edge compute the values at its nodes in the same way, on all ranks.
  *
- * The matrix is the same for all faces with the same number of corners, and for all edges. So the nodes of these faces
- * or edges are gathered into one array in which each node's tuples of all faces are contiguous, and all faces are
- * computed by one product of matrices.
+ * The matrix is the same for all faces with the same number of corners, and for all edges. So the tuples at the nodes
+ * of these faces or edges are gathered into one array, in which the tuples at the n-th nodes of all faces are
+ * contiguous. One product of matrices then computes all faces.
  *
  * Each sum adds up differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
@@ -37,6 +37,7 @@ static int find_lexicographic_index(const session_nodes *of, const int at[3])
 
 /* ---- weights --------------------------------------------------------------------------------------------------- */
 
+/* Computes the weights of a line: the values of its Lagrange polynomials at the nodes of the finer lattice. */
 static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
 {
     double x[NODES_MOST_ORDER + 1];
@@ -89,9 +90,12 @@ static double find_legendre(int n, double t)
 }
 
 /* Computes a pyramid's basis at a point with coordinates from 0 to 1. Its functions are
- * P_i(x / (1 - z)) P_j(y / (1 - z)) (1 - z)^max(i, j) P_k(z), with i and j up to p, and k up to p - max(i, j). They
- * contain all polynomials of order p, those of both orders p on the base, and no others on the triangles (Bergot,
- * Cohen, Durufle: Higher-order finite elements for hybrid meshes using new nodal pyramidal elements, 2010). */
+ *
+ *     P_i(x / (1 - z)) P_j(y / (1 - z)) (1 - z)^max(i, j) P_k(z),
+ *
+ * with i and j up to p, and k up to p - max(i, j). Together they contain all polynomials of order p; on the base, all
+ * polynomials of order p along each of the two axes; on the triangles, only polynomials of order p (Bergot, Cohen,
+ * Durufle: Higher-order finite elements for hybrid meshes using new nodal pyramidal elements, 2010). */
 static void fill_pyramid_basis(int p, const double at[3], double *out)
 {
     const double rest = 1 - at[2], x = rest > 0 ? at[0] / rest : 0, y = rest > 0 ? at[1] / rest : 0;
@@ -192,6 +196,7 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
     return of->type != GRID_PYRAMID || fill_pyramid_weights(p, parts, out->whole);
 }
 
+/* Finds out->positions and out->corners, the positions of nodes and corners in the cell's list of nodes. */
 static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     const int p = of->order;
@@ -212,6 +217,8 @@ typedef struct side_axes {
     const signed char *origin, *along, *across;
 } side_axes;
 
+/* Finds the axes of a face or edge for one of the orders in which its nodes can be listed. turn: number of this order,
+ * 0 .. session_interpolation_sides.turn_count - 1. */
 static side_axes find_side_axes(const session_shape *shape, const signed char *side, int corner_count, int turn)
 {
     const int first = corner_count == 2 ? turn : turn / 2, step = corner_count > 2 && turn % 2 ? corner_count - 1 : 1;
@@ -341,6 +348,7 @@ typedef struct cell_job {
     const session_interpolation *of;
     int size;        /* number of components */
     double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
+    /* working memory for intermediate results; each has the size of spare_count() tuples */
     double *spare[2];
     double *out;
 } cell_job;
@@ -474,7 +482,7 @@ static void fill_all_fine_nodes(const cell_job *job)
     }
 }
 
-/* Computes the rank of each corner in the lexicographic order of positions: the number of corners before it. */
+/* Computes for each corner the number of corners before it in the lexicographic order of positions. */
 static void rank_corners(int count, const double (*corners)[3], int ranks[8])
 {
     for (int c = 0; c < count; c++) ranks[c] = 0;
@@ -486,8 +494,9 @@ static void rank_corners(int count, const double (*corners)[3], int ranks[8])
         }
 }
 
-/* Chooses one of the orders in which the nodes of a face or an edge can be listed, by the ranks of its corners in the
- * order of positions. All cells that share the face or edge choose the same order of its nodes. */
+/* Chooses one of the orders in which the nodes of a face or an edge can be listed, by the places of its corners in the
+ * lexicographic order of positions (rank_corners()). All cells that share the face or edge choose the same order of its
+ * nodes. */
 static int choose_corner_numbering(const signed char *side, int corner_count, const int ranks[8])
 {
     int first = 0;

@@ -11,9 +11,9 @@
  * faces or edges in one of them */
 enum { INTERPOLATION_SIDES = 3, INTERPOLATION_MOST_SIDES = 12 };
 
-/* The faces of a cell with the same number of corners, or its edges. The nodes of a face can be listed in several
- * orders, which begin at each of its corners and follow the face in either direction; those of an edge in two
- * orders. */
+/* All quads among the faces of a cell, all triangles among them, or all edges of the cell. The nodes of a face can be
+ * listed in several orders, which begin at each of its corners and follow the face in either direction; those of an
+ * edge in two orders. */
 typedef struct session_interpolation_sides {
     int corner_count; /* of a face: 4 or 3; of an edge: 2 */
     int count;        /* number of these faces or edges of the cell */
@@ -49,19 +49,21 @@ typedef struct session_interpolation {
     int (*own)[2]; /* for each such node of the cell, its index in `complete` and the index in `fine` */
 } session_interpolation;
 
-/* Largest order of pyramids that can be interpolated, because a matrix of all of their nodes is inverted. */
+/* Largest order of pyramids that can be interpolated. It is limited because a matrix with one row and one column per
+ * node of the pyramid is inverted. */
 enum { INTERPOLATION_MOST_PYRAMID = 6 };
 
 /* Finds the interpolation from the nodes of a type and order of cells (`of`) to a lattice of the order parts *
  * of->order, which must be at most NODES_MOST_ORDER; pyramids have at most the order INTERPOLATION_MOST_PYRAMID. order:
- * the order in which nodes are stored in connectivity. is_lobatto: nodes along the axes of hexes and quads are
- * Gauss-Lobatto points; otherwise they are equispaced. Returns false if memory runs out; the caller must drop *out in
- * any case. */
+ * the order in which a cell's nodes are listed in the connectivity. is_lobatto: nodes along the axes of hexes and quads
+ * are Gauss-Lobatto points; otherwise they are equispaced. Returns false if memory runs out; the caller must drop *out
+ * in any case. */
 bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
-/* Fills in only the members that session_complete_tuples() needs, without fine nodes and weights. */
+/* Fills in only the members that session_complete_tuples() needs, without fine nodes and weights. Returns false if
+ * memory runs out. */
 bool session_make_node_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
 
 /* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order

@@ -65,7 +65,8 @@ static insitu_status check_cells(const insitu_lattice *l, base_error *error)
                      (long long)l->cells[0], (long long)l->cells[1], (long long)l->cells[2]);
 }
 
-/* Sorts the axes by stride; an axis with a single index comes first, because its stride is never used. */
+/* Stores the axes in `order`, sorted by stride; an axis with a single index comes first, because its stride is never
+ * used. */
 static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -147,10 +148,12 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
-/* Largest magnitude of `first`, because doubles do not represent all larger integers. */
+/* Largest allowed magnitude of insitu_lattice.first, the index of a block's first vertex in the whole lattice. Doubles
+ * do not represent all larger integers. */
 static const int64_t largest_first = (int64_t)1 << 53;
 
-/* Limits that keep products of indices and refinements within 2^62. */
+/* Largest allowed magnitude of insitu_lattice.first and largest allowed refinement, in lattices with levels of
+ * refinement. They keep products of indices and refinements within 2^62. */
 static const int64_t largest_refined_first = (int64_t)1 << 40, largest_refinement = (int64_t)1 << 20;
 
 static insitu_status check_refinement(const insitu_lattice *l, base_error *error)

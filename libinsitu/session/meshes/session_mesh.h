@@ -82,13 +82,15 @@ typedef struct session_plane {
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;                /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
-    int component;            /* index of the component, or -1 for the magnitude (grid_field.component) */
-    bool is_recentred;        /* set if cell or corner values are averaged to vertices */
-    uint64_t mesh_group_name; /* value of scene_field.mesh_group_name, if the values are recentred */
-    int64_t computed_count;   /* number of times that the values have been computed */
-    uint64_t positions_hash;  /* session_mesh_group.positions_hash at the time when the values were computed */
-    bool is_used;             /* set if an image of this step uses the scalar */
+    int field;         /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
+    int component;     /* index of the component, or -1 for the magnitude (grid_field.component) */
+    bool is_recentred; /* set if cell or corner values are averaged to vertices */
+    /* if the values are recentred: hash that identifies the meshes across which they are averaged
+     * (session_mesh_group.name) */
+    uint64_t mesh_group_name;
+    int64_t computed_count;  /* number of times that the values have been computed */
+    uint64_t positions_hash; /* session_mesh_group.positions_hash at the time when the values were computed */
+    bool is_used;            /* set if an image of this step uses the scalar */
     /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
     bool needs_ranges;
     bool needs_all_cells; /* set if an image of this step may show any cell, whatever its values are */
@@ -113,7 +115,7 @@ typedef struct session_scalar {
     uint64_t checksum;        /* checksum of all values when they were last compared */
     uint64_t sample_checksum; /* checksum of a few of the values, to detect changes that the caller does not declare */
     int64_t version;          /* number of times that a checksum has shown that the values have changed */
-    bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
+    bool has_own_ranges;      /* set if the ranges are stored in the tree's nodes, and not in node_ranges */
     float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
     bool are_ranges_stale;    /* set if the ranges in the tree were computed for other values */
     /* number of drawn cells with a value that is not finite; a split cell counts once per piece */
@@ -170,7 +172,8 @@ typedef struct session_topology {
      * caller's */
     bool has_own_order;
     bool has_own_cells; /* set if the cells below are read instead of the caller's cells */
-    /* of the cells that are read; `offsets` has no data if all cells have the type cell_type */
+    /* offsets and connectivity of the cells that are read; `offsets` has no data if all cells have the type
+     * cell_type */
     grid_array offsets, connectivity;
     unsigned char *cell_types; /* type of each cell; NULL: all cells have the type cell_type */
     int cell_type;
@@ -246,10 +249,11 @@ typedef struct session_finer {
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces; /* the pieces of refined cells that are made */
-    /* for each of the caller's cells, a bit mask of its outer faces (session_outer_cells.h); NULL: not computed */
+    /* for each of the caller's cells, a bit mask in which bit f is set if session_shape.faces[f] is an outer face
+     * (session_outer_cells.h); NULL: not computed */
     unsigned char *outer_faces;
     bool is_lobatto;     /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
-    insitu_mesh nodal;   /* the caller's mesh with copies in place of the arrays that cannot be read in place */
+    insitu_mesh nodal;   /* the caller's mesh, in which copies replace the arrays that cannot be read in place */
     insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */
     double *coordinates; /* 3 coordinates per node of the finer lattices */
     int64_t *offsets;    /* offsets of the finer cells; NULL if all cells have the same type and order */
@@ -301,14 +305,15 @@ enum { SESSION_CONFORMED = 9 };
 /* Copies of arrays whose type cannot be read in place (session_conform.h). insitu_report lists them. */
 typedef struct session_conformed {
     char *copies[SESSION_CONFORMED]; /* NULL: the array is read in place */
-    /* cell types converted from the caller's own numbers; NULL: the caller uses the library's numbers */
+    /* copy of the caller's map, with type_count entries: types[number] is the cell type for which the caller uses this
+     * number; NULL: the caller uses the library's numbers */
     unsigned char *types;
     int type_count;
     int64_t bytes;
 } session_conformed;
 
-/* The cells of a refined block without its ghost layers, as a box of indices in the block's level. It is sent to other
- * ranks as 64-bit words. */
+/* The cells of a refined block without its ghost layers, as a box of cell indices at the block's level of refinement.
+ * It is sent to other ranks as 64-bit words. */
 typedef struct session_level_box {
     uint64_t mesh; /* hash of the mesh's name */
     int64_t block, rank;
@@ -319,7 +324,7 @@ typedef struct session_level_box {
 typedef struct session_misfit {
     bool exists; /* set if a finer block covers only part of a cell; the other members then describe this block */
     int axis;    /* axis along which the finer block ends within the cell */
-    /* index of the finer block among the blocks of its rank, and its refinement along the axis */
+    /* number of the finer block (session_mesh.block), and its refinement along the axis */
     int64_t block, refinement;
     int rank; /* rank that has the finer block */
 } session_misfit;
@@ -376,7 +381,7 @@ typedef struct session_mesh {
     double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
     uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
-    /* name of the mesh group that contains only this mesh (session_catalogue_mesh.single_group_name) */
+    /* hash that identifies the mesh group of this mesh alone (session_catalogue_mesh.single_group_name) */
     uint64_t single_group_name;
     /* set if a block of the mesh, on any rank, has a level of refinement (session_catalogue_mesh.is_refined) */
     bool is_refined;
@@ -435,6 +440,7 @@ typedef struct session_meshes {
     session_filling filling;
 } session_meshes;
 
+/* Returns the size of an element of this type in bytes. */
 static inline int64_t session_type_size(insitu_type type)
 {
     switch (type) {
@@ -455,13 +461,14 @@ static inline int64_t session_type_size(insitu_type type)
 /* Returns whether the address and the stride of an array are multiples of its element size. */
 bool session_is_aligned(const insitu_array *array);
 
-/* Returns the caller's array as the grid_array through which meshes are read. Its indices count from 0. */
+/* Returns the caller's array as the grid_array through which meshes are read. If the array contains indices, they are
+ * read as counting from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
 /* Returns the vertices' coordinates along an axis. If z is not given, returns an array all of whose elements are 0. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
-/* Returns an array of indices as a grid_array. Its indices count from the mesh's index_base. */
+/* Returns an array of indices as a grid_array, which subtracts the mesh's index_base from each index that is read. */
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
 
 /* Returns an array of offsets as a grid_array, for `count` cells or faces that have `entries` entries in total. The
@@ -501,11 +508,12 @@ static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
 
+/* Returns this rank's parts of the mesh with this name. */
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
 /* Returns the parts that have the same name as the part at index `first`, which must be the first part with this
  * name. */
 session_parts session_find_parts_from_index(const session_meshes *meshes, int first);
-/* Returns the block with this name and number, or NULL if there is none. */
+/* Returns the block with this number of the mesh with this name, or NULL if there is none. */
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
 /* Returns the mesh with this name that is not given as blocks, or NULL if there is none. */
 static inline session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)

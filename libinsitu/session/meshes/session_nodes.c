@@ -121,6 +121,8 @@ static int number_quad_node(int p, int i, int j)
     return 4 + 4 * inner + i - 1 + inner * (j - 1);
 }
 
+/* Returns the index of a hex's node in VTK's order. is_old: in the order of VTK before version 9.1, in which the nodes
+ * of two edges along k are swapped. */
 static int number_hex_node(int p, bool is_old, int i, int j, int k)
 {
     const int r = p - 1;

@@ -7,6 +7,7 @@
 #include "grid.h"
 #include "insitu/insitu.h"
 
+/* highest supported order of cells */
 enum { NODES_MOST_ORDER = 32 };
 
 /* A type of cell and its order. A complete cell has all nodes of the lattice of its order; a serendipity cell (8, 13,
@@ -25,8 +26,8 @@ int session_corner_type(int type);
 /* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
 bool session_is_lagrange(int type);
 
-/* Finds the description of a cell of the type, which must not be linear, with `count` nodes. Returns false if no order
- * of the type has this number of nodes. */
+/* Describes the cell of this type, which must not be linear, that has `count` nodes. Returns false if no order of the
+ * type has this number of nodes. */
 bool session_describe_nodes(int type, int64_t count, session_nodes *out);
 
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */

@@ -15,7 +15,7 @@
 bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int64_t count, int axes,
                                  const insitu_type types[3], int64_t *bytes, bool *is_new);
 
-/* Stores a coordinate. Returns whether it differs from the value stored there before. */
+/* Stores a vertex's coordinate in the array. Returns whether it differs from the value that the array held before. */
 static inline bool session_store_coordinate(const insitu_array *array, int64_t vertex, double number)
 {
     char *to = (char *)(uintptr_t)array->data + vertex * array->stride_bytes;

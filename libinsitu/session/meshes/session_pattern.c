@@ -32,6 +32,7 @@ typedef struct pattern_list {
     insitu_vertex_order order;
 } pattern_list;
 
+/* Adds a piece. nodes: lattice indices of its vertices. */
 static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 {
     session_pattern *out = list->out;
@@ -125,6 +126,8 @@ static void list_pieces(const pattern_list *list)
 
 /* ---- serendipity cells ----------------------------------------------------------------------------------------- */
 
+/* Returns the node in the middle of the edge between corners a and b, in VTK's order, or -1 if there is no such
+ * edge. */
 static int find_midpoint(const session_shape *shape, int a, int b)
 {
     for (int e = 0; e < shape->edge_count; e++)
@@ -179,6 +182,8 @@ static void orient_outwards(const session_shape *shape, pattern_polygon *p)
     }
 }
 
+/* Finds the midpoints of a serendipity cell's edges, and the polygons by which the cell is split
+ * (session_pattern.h). */
 static void find_polygons(session_pattern *out, insitu_vertex_order order)
 {
     const session_shape *shape = session_shape_of(out->nodes.type);
@@ -222,6 +227,7 @@ static bool has_node(const pattern_polygon *p, int node)
     return has;
 }
 
+/* Does the same as session_cut_serendipity() for a quad. */
 static int split_quad(const session_pattern *of, const int *ranks, int pieces[][4])
 {
     int count = 0, triangles[2][3];

@@ -6,7 +6,8 @@
 
 #include "session_nodes.h"
 
-/* Maximum numbers of the pieces (loose) and the polygons of a serendipity cell. */
+/* PATTERN_MOST_LOOSE: maximum number of pieces of a serendipity cell; PATTERN_MOST_POLYGONS: maximum number of polygons
+ * by which it is split. */
 enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
 
 /* A polygon by which a serendipity cell is split; its vertices are midpoints of the cell's edges. Each corner of the
@@ -33,14 +34,14 @@ typedef struct session_pattern {
     int midpoints[12]; /* positions of the nodes in the middle of edges, in the cell's list of nodes */
 } session_pattern;
 
-/* Lists the pieces of a type and order of cell. Returns false if memory runs out. The only piece of a linear cell
- * (order 1) is the cell itself. */
+/* Lists the pieces of cells of this type and with these nodes. order: the order in which a cell's nodes are listed in
+ * the connectivity. Returns false if memory runs out. The only piece of a linear cell (order 1) is the cell itself. */
 bool session_make_split_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
 void session_drop_split_pattern(session_pattern *pattern);
 
 /* Stores the vertices of a serendipity cell's pieces, as positions in the cell's list of nodes: 4 for each tet, or 3
- * for each triangle of a quad. ranks[position]: the rank of a midpoint in the lexicographic order of coordinates.
- * Returns the number of pieces. */
+ * for each triangle of a quad. ranks: for each midpoint, at the index of its position in that list, the number of
+ * midpoints before it in the lexicographic order of coordinates. Returns the number of pieces. */
 int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
 
 #endif

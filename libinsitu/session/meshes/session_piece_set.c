@@ -101,6 +101,7 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
     }
 }
 
+/* Selects one piece at each of the own nodes of each marked cell. */
 static bool fill_sets(const piece_work *w, const unsigned char *marks, int parts)
 {
     const int64_t cells = w->rows.cells.cell_count;
@@ -155,6 +156,7 @@ static size_t find_buffer_size(const piece_work *w, int field_size)
     return most + (size_t)field_size;
 }
 
+/* Selects the pieces that an isosurface may cross. values: the values at the nodes of the finer lattice. */
 static void add_pieces(const piece_kind *kind, const session_isovalues *isovalues, const double *values, uint64_t *bits)
 {
     double most = 0;
@@ -172,6 +174,8 @@ static void add_pieces(const piece_kind *kind, const session_isovalues *isovalue
     }
 }
 
+/* Selects the pieces of a refined cell that an isosurface or the plane of the request may cross. buffer: working memory
+ * of find_buffer_size() doubles. */
 static void add_cell(const piece_work *w, int64_t cell, int field_size, double *buffer)
 {
     const piece_kind *kind = kind_of(w, cell);
@@ -220,7 +224,8 @@ insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session
 
 /* ---- pieces on outer faces --------------------------------------------------------------------------------------- */
 
-/* Finds a bit mask of faces for each node of the finer lattice. */
+/* Computes, for each node of the finer lattice, a bit mask of the faces on which the node lies; bit f stands for
+ * session_shape.faces[f]. */
 static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
 {
     const session_shape *shape = session_shape_of(fine->type);

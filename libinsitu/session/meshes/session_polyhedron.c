@@ -105,6 +105,8 @@ typedef struct volume_sums {
     double volume_from_mean, volume_from_corner;
 } volume_sums;
 
+/* Adds the tets on the fan of triangles of a face to the sums. mean: mean of the cell's vertices. origin: position of
+ * the cell's lexicographically first vertex, relative to the mean. */
 static void add_fan(const grid *g, int64_t face, const double mean[3], const double origin[3], volume_sums *sums)
 {
     int64_t from, to;

@@ -33,11 +33,13 @@ session_rows session_describe_rows(const session_mesh *mesh);
 /* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is left empty. */
 session_rows session_describe_caller_rows(const insitu_mesh *given);
 
+/* Returns the index, in the caller's connectivity, of the entry with a cell's first node. */
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
 {
     return rows->cells.offsets.data ? grid_array_index(&rows->cells.offsets, cell) : cell * rows->row_stride;
 }
 
+/* Returns the number of nodes of a cell. */
 static inline int64_t session_row_size(const session_rows *rows, int64_t cell)
 {
     if (!rows->cells.offsets.data) return rows->nodes_per_cell;

@@ -24,7 +24,8 @@ const session_shape *session_shape_of(int type);
  * plane z = 0, it is parallel to z. */
 void session_find_face_plane(const session_shape *shape, int face, int out[3]);
 
-/* Returns a bit mask of the faces on which a node i, j, k of a lattice of this order lies. */
+/* Returns a bit mask of the faces on which a node of a lattice of this order lies; bit f stands for shape->faces[f].
+ * node: lattice indices of the node. */
 unsigned session_faces_of_node(const session_shape *shape, int order, const int node[3]);
 
 #endif

@@ -12,8 +12,9 @@ typedef struct session_extent {
     double half_diagonal;      /* half the diagonal of the bounds */
     int64_t cell_count;        /* number of drawn cells on all ranks */
     int64_t solid_count;       /* number of drawn cells that have a volume */
-    double cell_size;          /* mean cube root of the volumes of solid cells; 0 if there are none */
-    int rank_count;            /* number of ranks with at least one drawn cell */
+    /* mean of the cube roots of the volumes of the cells that have a volume; 0 if there are none */
+    double cell_size;
+    int rank_count; /* number of ranks with at least one drawn cell */
 } session_extent;
 
 /* Returns the axis along which the data is flat (the last such axis, if there are several), or -1 if the data is not

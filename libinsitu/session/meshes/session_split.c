@@ -184,8 +184,8 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
 
 /* ---- pieces ---------------------------------------------------------------------------------------------------- */
 
-/* Computes the rank of each midpoint of a serendipity cell in the lexicographic order of their positions; equal
- * positions have equal ranks. */
+/* Computes, for each midpoint of a serendipity cell, the number of midpoints before it in the lexicographic order of
+ * positions; midpoints at equal positions have equal numbers. */
 static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
     double at[12][3];

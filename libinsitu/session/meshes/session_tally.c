@@ -81,8 +81,8 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
     return box;
 }
 
-/* Returns whether the volume is 0 at each of the cell's corners. A cell that intersects itself may have a sum of 0
- * without being flat. */
+/* Returns whether the determinant of the edges is 0, up to rounding, at each of the cell's corners. The determinants of
+ * a cell that intersects itself may sum to 0 although the cell is not flat. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
     const cell_corners of = find_cell_corners(type);
@@ -108,8 +108,8 @@ MMBVH_INLINE double cell_size(double volume)
     return y;
 }
 
-/* Adds a cell's volume to the sums. For a flat cell, whose computed volume is only a rounding error, 0 must be
- * passed. */
+/* Adds a drawn cell with this volume to *tally. For a flat cell, whose computed volume is only a rounding error, 0 must
+ * be passed. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn_count++;
@@ -165,8 +165,9 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 
 /* ---- corners with different signs ---------------------------------------------------------------------------- */
 
-/* A corner counts as flat if its volume is less than this fraction of the largest volume at a corner of the cell. Hexes
- * with two coincident vertices, and cells with a vertex on a nearly straight edge, have such corners. */
+/* A corner counts as flat if the determinant of its edges (of a quad: the area of its parallelogram) is less than this
+ * fraction of the largest one in the cell. Hexes with two coincident vertices, and cells with a vertex on a nearly
+ * straight edge, have such corners. */
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
@@ -238,7 +239,7 @@ MMBVH_INLINE bool read_points(const grid *g, int64_t first, int count, bool is_g
     return is_ghost || poison == 0;
 }
 
-/* Adds one cell to the sums, and lowers *least to the cell's absolute volume if that is smaller. Returns false, without
+/* Adds one cell to *t, and lowers *least to the cell's absolute volume if that is smaller. Returns false, without
  * adding anything, if the cell is invalid. */
 MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
                                  const fetch_shape shape, const bool wide_index, const bool wide_number)
@@ -316,9 +317,9 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to the sums with vectorized code, and lowers *least to the smallest absolute volume
- * of these cells. Returns the number of cells that were added. *alone receives the number of following cells that must
- * be added one by one. */
+/* Adds the first cells of the run to *t with vectorized code, and lowers *least to the smallest absolute volume of
+ * these cells. Returns the number of cells that were added. *alone receives the number of following cells that must be
+ * added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
@@ -336,9 +337,10 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
     return taken;
 }
 
-/* Sums up cells begin .. end - 1 a second time, testing each cell with its own bounding box. This is needed only if the
- * smallest volume is so small, compared to the common bounding box of these cells, that a cell may be flat. Computing
- * each cell's box in the first pass would take a thirtieth of its time for a mesh of tets. */
+/* Computes the tally of the cells begin .. end - 1 a second time, and compares each cell's volume with that of the
+ * cell's own bounding box to find out whether the cell is flat. This is needed only if the smallest volume is so small,
+ * compared to the common bounding box of these cells, that a cell may be flat. Computing each cell's box in the first
+ * pass would take a thirtieth of its time for a mesh of tets. */
 static mesh_tally tally_cells_with_own_boxes(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();

@@ -16,24 +16,25 @@ typedef struct mesh_tally {
 mesh_tally tally_empty(void);
 void tally_merge(mesh_tally *sum, const mesh_tally *part);
 
-/* Adds a valid cell of any type to the sums. */
+/* Adds a valid cell of any type to *tally. */
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
-/* Returns whether the volumes at the corners of a hex, wedge or pyramid, or the areas at the corners of a quad, have
- * both signs. They have both signs if the caller stores vertices in another order than the order in which they are
- * read. */
+/* Returns whether the corners of a hex, wedge, pyramid or quad have both signs. The sign of a solid cell's corner is
+ * that of the determinant of the three edges at the corner. The sign of a quad's corner shows whether the normal there
+ * points to the same side as the normal at the quad's first corner. Corners have both signs if the caller stores
+ * vertices in another order than the order in which they are read. */
 bool tally_has_both_signs(int type, double points[][3]);
 
-/* Returns the mean of the volumes at the corners of a tet, hex, wedge or pyramid, computed from the positions of its
- * vertices. It is negative if the cell is left-handed. */
+/* Returns the signed volume of a tet, hex, wedge or pyramid, averaged over the ways to divide the cell into tets
+ * (session_corners.h). It is negative if the cell is left-handed. */
 double tally_signed_volume(int type, double points[][3]);
 
 /* Returns whether the volume of a valid cell is 0 up to rounding, which includes all shells. Returns false for a
  * ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
-/* Checks cells begin .. end - 1 and adds them to *tally. Returns the index of the first invalid cell, or `end` if all
- * are valid. */
+/* Checks cells begin .. end - 1 and adds the valid ones to *tally. Stops at the first cell that is invalid, or that the
+ * function cannot check, such as a polygon. Returns the index of this cell, or `end`. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
 /* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,

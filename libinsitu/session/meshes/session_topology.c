@@ -249,6 +249,7 @@ static void store_faces(const session_mesh *mesh, const session_face_sides *side
     session_store_index(&t->offsets, 0, 0);
 }
 
+/* Computes the list of the faces of each cell from the owners and neighbours of faces. */
 static insitu_status list_faces(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
@@ -295,8 +296,9 @@ static bool read_face_ring(const session_mesh *mesh, int64_t face, face_ring *ri
     return true;
 }
 
-/* Finds an unused face that contains the edge between `ends`. above[i] receives the face's other vertex that is
- * adjacent to ends[i]. Returns the face's index, or -1 if there is none. */
+/* Finds a face that contains the edge between `ends` and whose bit in the mask `used` is not set. rings: the faces of
+ * the cell. above[i] receives the face's other vertex that is adjacent to ends[i]. Returns the face's index, or -1 if
+ * there is none. */
 static int find_side_face(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
