@@ -1,5 +1,5 @@
-/* Defines discontinuous meshes. In such a mesh, every cell has its own vertices. Discontinuous meshes are used for
- * fields with a value at each corner of each cell.
+/* Makes meshes discontinuous: in a discontinuous mesh, no two cells have a common vertex. Discontinuous meshes are used
+ * for fields with a value at each corner of each cell.
  *
  * All other code finds a value by the index of a vertex. Therefore a mesh with a corner field is read as a mesh in
  * which every corner is a vertex. Its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....

@@ -12,11 +12,12 @@
  * bounds. The slice is shifted to the inside. */
 #define SESSION_BORDER_SHARE 1e-6
 
-/* Computes a point of the plane for the current step. */
+/* Computes a point on the plane. A plane may be defined relative to the centre of the data's bounds, which may differ
+ * from step to step. */
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3]);
 
-/* Marks the distances from the plane on the mesh as used by an image of this step. Returns false if memory runs out.
- * Local. */
+/* Marks the distances from the plane on the mesh as used by an image of this step. *marked receives the scalar that
+ * holds these distances. Returns false if memory runs out. Local. */
 bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
                            session_scalar **marked);
 
@@ -27,9 +28,9 @@ session_scalar *session_find_distance(const session_mesh *mesh, const scene_plan
  * coordinates, so that all ranks obtain the same value. Local. */
 void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Returns the distance at which the plane is drawn. low and high are the minimum and maximum of the distances between
- * the data and the plane, over all ranks. The result is 0 or, if the plane lies on the border of the data, a distance
- * just far enough inside for the slice to be visible. */
+/* Returns the distance at which the plane is drawn. low, high: minimum and maximum, over all ranks, of the signed
+ * distances of the data's vertices from the plane. The result is 0 or, if the plane lies on the border of the data, a
+ * distance just far enough inside for the slice to be visible. */
 double session_slice_distance(double low, double high, double half_diagonal);
 
 #endif

@@ -32,6 +32,7 @@ typedef struct delivery {
     int tag, rank, ranks;
     int send_count;     /* number of messages that this rank sends */
     MPI_Request *sends; /* MPI requests, one per sent message */
+    /* linked list of the received messages */
     message *messages;
 } delivery;
 

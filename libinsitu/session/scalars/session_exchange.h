@@ -11,9 +11,9 @@
 
 /* The words that a rank sends to all ranks, or receives from all ranks. A word has 8 bytes. */
 typedef struct session_mail {
-    int64_t *counts; /* number of words for each rank */
-    uint64_t *words; /* the words for all ranks, in the order of ranks */
-    int64_t total;   /* number of words for all ranks */
+    int64_t *counts; /* number of words that are sent to each rank, or were received from it */
+    uint64_t *words; /* the words that are sent to or were received from all ranks, in the order of ranks */
+    int64_t total;   /* number of words of all ranks together */
 } session_mail;
 
 void session_mail_free(session_mail *mail);
@@ -25,8 +25,8 @@ typedef enum session_mail_tag { SESSION_MAIL_THERE = 1, SESSION_MAIL_BACK } sess
 /* Sends the words in every rank's `out` to the ranks for which they are intended. *in receives the words for this rank,
  * and owns its memory. A rank sends messages only to ranks for which it has words. One reduction determines when all
  * messages have been received. If a rank's *error already holds an error, its `out` is not read, and all ranks return
- * this error. An error while receiving is only stored in *error of this rank, and *in is then empty; the next phase
- * must pass the error to all ranks. Collective. */
+ * this error. An error while receiving is only stored in *error of this rank, and *in is then empty; the next
+ * collective call, such as session_agree(), must pass the error to all ranks. Collective. */
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error);
 

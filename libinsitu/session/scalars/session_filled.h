@@ -5,9 +5,10 @@
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Calls the fill functions of the fields that statistics need or, if of_images is set, of the fields whose scalars
- * images use. Functions that have been called in this step are not called again. All functions are called, even if some
- * fail, in the same order on all ranks. The first error is returned. Local, but fill functions may communicate. */
+/* Calls the fill functions of the fields whose values are needed: if of_images is set, the fields that the images of
+ * this step show; otherwise the fields that statistics need; in both cases also the fields from which derived fields
+ * are computed. Functions that have been called in this step are not called again. All functions are called, even if
+ * some fail, in the same order on all ranks. The first error is returned. Local, but fill functions may communicate. */
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 

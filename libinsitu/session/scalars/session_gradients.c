@@ -10,11 +10,11 @@
  * derivatives of the position along the axes of the reference cell replace the edges, and the derivatives of the field
  * replace the differences.
  *
- * The weight of a corner is its determinant divided by the fourth power of the length l = sqrt(|a|² + |b|² + |c|²) of
- * its edges. The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver, whose weight is
- * almost 0. The factor 1 / l gives small cells more weight, because their gradients belong to nearer positions. With
- * this weight, errors of first order cancel in a mesh whose cells double their size at a vertex. The product of weight
- * and gradient is a sum of cross products, so that no division by a determinant is needed.
+ * The weight of a corner is the determinant of its edges a, b and c, divided by the fourth power of the corner's length
+ * l = sqrt(|a|² + |b|² + |c|²). The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver,
+ * whose weight is almost 0. The factor 1 / l gives small cells more weight, because their gradients belong to nearer
+ * positions. With this weight, errors of first order cancel in a mesh whose cells double their size at a vertex. The
+ * product of weight and gradient is a sum of cross products, so that no division by a determinant is needed.
  *
  * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. Therefore
  * the result does not depend on the order of cells, of their vertices, or of ranks. The value of the integers' last bit
@@ -59,6 +59,7 @@ typedef struct target {
     unsigned char *owners;
     unsigned char owner; /* value that stands for this thread in `owners` */
     double scale;        /* factor by which coordinates are multiplied, a power of two */
+    /* factors by which the numbers are multiplied before they are rounded to integers (find_rounding_units()) */
     number_pair units[MOST_NUMBERS / 2];
     session_gradient_bounds bounds;
 } target;
@@ -75,6 +76,8 @@ static double find_power_of_two(double largest)
     return largest > 0 && isfinite(unit) ? unit : 0;
 }
 
+/* Computes the factors by which weighted gradients (units[0]) and weights (units[1]) are multiplied before they are
+ * rounded to integers. */
 static void find_rounding_units(const session_gradient_bounds *bounds, double units[2])
 {
     units[0] = find_power_of_two(bounds->largest_difference * bounds->largest_inverse_square);

@@ -24,10 +24,10 @@ typedef struct session_gradient_basis {
     const session_polynomials *polynomials;
 } session_gradient_basis;
 
-/* Returns how many numbers a sum over the cells around a vertex consists of. Each number is stored as a high and a low
- * integer word, so that adding two sums word by word is exact and does not depend on the order. The high words come
- * first: three components for each scalar, then the weight, and padding to an even number. The low words follow in the
- * same order. */
+/* Returns the count of the numbers of which the sum over the cells around a vertex consists. Each number is stored as a
+ * high and a low integer word, so that adding two sums word by word is exact and does not depend on the order. The high
+ * words come first: three components for each scalar, then the weight, and padding to an even number. The low words
+ * follow in the same order. */
 static inline int session_count_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
@@ -40,7 +40,7 @@ static inline int session_count_sum_words(int field_count)
 
 /* Bounds of the numbers that cells add to sums. The bounds for several grids or ranks are the maxima of each member. */
 typedef struct session_gradient_bounds {
-    double largest_difference; /* largest difference of a field's values along an edge of a corner */
+    double largest_difference; /* largest difference of a field's values along an edge at a cell's corner */
     /* largest value of 1 / (sum of the squared lengths of the edges at a cell's corner), with lengths as multiples of
      * the `length` that scales all gradients; 0: there are no corners */
     double largest_inverse_square;
@@ -61,8 +61,8 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Returns an array with one byte per sum. In it, session_add_gradients() records which thread adds to the sum, or that
- * several do. It is allocated by base_alloc(); NULL if memory runs out. Local. */
+/* Returns an array with one byte per sum. In the byte of a sum, session_add_gradients() records which thread adds to
+ * this sum, or that several threads do. It is allocated by base_alloc(); NULL if memory runs out. Local. */
 unsigned char *session_create_sum_owners(int64_t sum_count, int threads);
 
 /* Adds the cells' contributions to the sums. Each sum has session_count_sum_words() words. bounds: the bounds over all

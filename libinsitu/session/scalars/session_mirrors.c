@@ -55,6 +55,7 @@ static insitu_field describe_field(session_mesh *image, const session_field *fro
     return out;
 }
 
+/* Sets a field of the source mesh on its mirror image, unless the image already has the field's current values. */
 static insitu_status share_field(session_meshes *meshes, session_mesh *image, const session_field *from,
                                  base_error *error)
 {
@@ -140,7 +141,8 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */
 
-/* Bounds, over all ranks, of the meshes that the mirror draws: three minima, then three negated maxima. */
+/* Number of bounds that are computed for each mirror: the bounds, over all ranks, of the meshes to which it applies, as
+ * three minima and then three negated maxima. */
 enum { ENDS = 6 };
 
 static void find_bounds_of_mirrored_meshes(const scene_mirror *mirror, const scene *scene, const session_meshes *meshes,

@@ -1,5 +1,5 @@
-/* Creates and updates the mirror images of this rank's meshes, for which the scene asks, together with their fields
- * (meshes/session_mirror.h). */
+/* Creates and updates the mirror images that the scene requests of this rank's meshes, together with the fields of the
+ * images (meshes/session_mirror.h). */
 #ifndef SESSION_MIRRORS_H
 #define SESSION_MIRRORS_H
 

@@ -103,10 +103,9 @@ grid_field session_get_caller_values(const session_mesh *mesh, int index, int co
                       .is_cell_centred = field->given.centring == INSITU_CELL};
     if (!session_is_copied(mesh, field)) {
         if (!field->component_arrays) return out;
-        out.component_stride =
-            /* Each component has an array of its own. A single component is therefore read as a field with one
-             * component. */
-            0;
+        /* Each component has an array of its own. With a stride of 0, a component is read from the start of the array
+         * that is chosen here. */
+        out.component_stride = 0;
         if (component >= 0)
             out.values = field->component_arrays[component];
         else

@@ -6,7 +6,7 @@
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the component that a layer shows, as a value of grid_field.component. */
+/* Returns the index of the component that a layer shows, or -1 for the magnitude (grid_field.component). */
 int session_resolve_component(const scene_field *field, int component_count);
 
 /* Returns whether a field of this centring is drawn with values at vertices that the session computes. For cell fields
@@ -22,7 +22,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
 /* Returns the scalar that holds the field's values averaged at vertices over a mesh group; NULL if there is none.
- * mesh_group_name: the group's name, as in scene_field.mesh_group_name. */
+ * mesh_group_name: the hash that identifies the mesh group (session_mesh_group.name). */
 session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
                                        uint64_t mesh_group_name);
 
@@ -65,7 +65,7 @@ int64_t session_count_unusable_cells(const session_mesh *mesh, const session_sca
 mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Computes the minimum and maximum over the drawn cells all of whose values are finite; low > high if there are none.
- * Parallel. Local. */
+ * kind: selects the cells that are included. Parallel. Local. */
 void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                                 double *low, double *high);
 /* Marks the stored minima and maxima as unknown, because the values have changed. */
