@@ -191,6 +191,8 @@ static double round_coordinate(double at)
     return fabs(at * PARTS - parts) < 0.01 ? parts / PARTS : at;
 }
 
+/* Computes the position on the face at the face coordinates `at` (solve_face_coordinates()), and the derivatives of the
+ * position with respect to both coordinates, in `slopes`. */
 static void evaluate_face(const session_coarse_face *f, const double at[2], double out[3], double slopes[2][3])
 {
     const double bent = f->count == 4;

@@ -22,6 +22,7 @@ enum { SESSION_FACE_WORDS = 13 };
 /* The data of a triangle or quad that is needed to exclude most positions quickly, before the whole face is read. */
 typedef struct session_face_outline {
     int count;
+    /* count: number of corners, 3 or 4 */
     int64_t vertices[4]; /* vertices in the cell's own order */
     double corner_positions[4][3];
     session_box box;
@@ -46,8 +47,9 @@ void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], sessio
 /* Returns whether the position is within slack of a corner. */
 bool session_is_at_corner(const session_coarse_face *face, const double position[3], double slack);
 
-/* Computes the corners' weights at a position on the face; the fourth weight of a triangle is 0. Returns false if the
- * position is farther than `slack` from the face. */
+/* Computes the weights with which the values at the face's corners are summed to give the interpolated value at a
+ * position on the face; the fourth weight of a triangle is 0. Returns false if the position is farther than `slack`
+ * from the face. */
 bool session_find_weights(const session_coarse_face *face, const double position[3], double slack, double weights[4]);
 
 /* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */

@@ -136,8 +136,8 @@ static bool intersects_box(const session_level_box *box, const session_box *comm
     return true;
 }
 
-/* Packs, for each other rank, those boxes of this rank that intersect that rank's common box. If mail->words is NULL,
- * the words are only counted. */
+/* For each other rank, packs the boxes of this rank's blocks that intersect the common box of the other rank
+ * (find_common_box()). If mail->words is NULL, the words are only counted. */
 static void write_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
 {
     mail->total = 0;
@@ -255,8 +255,8 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     return true;
 }
 
-/* Bits of the bytes in the array of covered cells. IS_HIDDEN: a finer block covers the whole cell. IS_CUT: a finer
- * block covers only part of the cell; resolve_cuts() removes this bit. */
+/* Bits of the bytes in the array of covered cells. IS_HIDDEN: a finer block covers the whole cell, or the caller marks
+ * it as a ghost. IS_CUT: a finer block covers only part of the cell; resolve_cuts() removes this bit. */
 enum { IS_HIDDEN = 1, IS_CUT = 2 };
 
 /* Iterates over the rows of the cells in an overlap. A row contains the cells with the same indices j and k. */
@@ -367,8 +367,8 @@ static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned cha
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
 }
 
-/* Adds the caller's own ghost flags. If the flags have to be read from a copy, the copy is filled here, because the
- * session fills copies only later. */
+/* Marks the caller's ghosts in `covered`, too. If the caller's flags have to be read from a copy, the copy is filled
+ * here, because the session fills copies only later. */
 static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
@@ -448,7 +448,8 @@ static void find_neighbour_centre(const session_mesh *mesh, const session_level_
     }
 }
 
-/* Returns the finest box of the mesh that contains the position, or NULL if there is none. */
+/* Returns the finest box of the mesh that contains the position `at`, or NULL if there is none. mesh: hash of the
+ * mesh's name. */
 static const session_level_box *find_finest(const session_meshes *meshes, const box_bins *bins, uint64_t mesh,
                                             const double at[3])
 {
@@ -466,6 +467,7 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
     return finest;
 }
 
+/* Removes the outer faces of a block that have a block of another level on their other side. */
 static void drop_inner_faces(const session_meshes *meshes, const box_bins *bins, const session_mesh *mesh,
                              session_outer *outer)
 {

@@ -11,8 +11,8 @@
 #include "session_team.h"
 
 /* Finds the covered cells of all refined blocks, and marks them as ghosts in an array of the session. Blocks whose
- * covered cells have changed must be checked again. Blocks that do not end at borders of coarser cells get a `misfit`.
- * Collective; all ranks return the same status. */
+ * covered cells have changed must be checked again. If a finer block covers only part of a cell, session_mesh.misfit of
+ * the block that has this cell describes the finer block. Collective; all ranks return the same status. */
 insitu_status session_update_covered_cells(session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Removes the outer faces whose other side is in a block of another level, on any rank. The faces of thresholds and of

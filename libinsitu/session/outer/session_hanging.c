@@ -28,6 +28,8 @@ static const double least_ratio = 1.25;
  * angles. */
 static const double opposite = -0.1;
 
+/* Maximum number of rounds of session_constrain_hanging_vertices(). Several rounds are needed if a corner of a face is
+ * itself a hanging vertex on a larger face. */
 enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
@@ -43,8 +45,9 @@ typedef struct searched_face {
 typedef struct candidate {
     double position[3];
     int64_t group;
-    /* heads of two linked lists of contacts: with the faces on which the vertex lies, and with the faces of which it is
-     * a corner; -1: the list is empty */
+    /* Indices, in hanging_search.contacts, of the first elements of two linked lists; -1: the list is empty. hit_list:
+     * contacts with the faces on which the vertex lies; corner_list: contacts with the faces of which it is a
+     * corner. */
     int64_t hit_list, corner_list;
     int64_t face; /* index, in hanging_search.faces, of the face on which the vertex hangs; -1: it does not hang */
     double weights[4];
@@ -62,6 +65,8 @@ typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
     unsigned char *face_states; /* for each outer face in this rank's borders (session_border), its face_state */
+    /* face_count: number of entries of `faces`; own_count: number of entries at the beginning of `faces` that are this
+     * rank's faces; face_capacity: number of entries for which there is memory */
     int64_t face_count, own_count, candidate_count, face_capacity;
     /* faces of this rank that may touch candidates, then the received faces, then this rank's faces that were read
      * later */
@@ -84,6 +89,7 @@ static void search_free(hanging_search *s)
 
 /* ---- borders: outer faces of parts of meshes --------------------------------------------------------------------- */
 
+/* Stores in *out the outer faces, which are taken from `outer`, and the vertices that are marked in is_border. */
 static bool store_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
                          session_border *out)
 {
@@ -352,8 +358,8 @@ static double find_face_slack(const hanging_search *s, const session_coarse_face
     return relative_slack * f->width + s->rounding;
 }
 
-/* Packs, for each other rank near this one, the faces of this rank that intersect the other rank's box. If mail->words
- * is NULL, the words are only counted. */
+/* Packs, for each other rank near this one, the faces of this rank that intersect the other rank's box. sent: receives
+ * the index of each packed face. If mail->words is NULL, the words are only counted. */
 static void write_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
     const session_homes *homes = s->basis->mesh_group->homes;
@@ -446,6 +452,8 @@ static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, NULL, &c->corner_list);
 }
 
+/* A test of a candidate on the face with the index `number`: test_face_hit() or test_face_corner(). Returns false if
+ * memory runs out. */
 typedef bool try_function(hanging_search *s, int64_t number, candidate *c);
 
 static bool test_faces(hanging_search *s, try_function *try_one)
@@ -472,6 +480,8 @@ static double find_largest_opposite_area(const hanging_search *s, const candidat
     return area;
 }
 
+/* Chooses, of the faces on which the candidate lies, the largest one on which it hangs according to session_hanging.h.
+ * Sets c->face and c->weights if there is one. */
 static void choose_face(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {
@@ -534,8 +544,9 @@ static bool store_vertices(const hanging_search *s, const int64_t *firsts, sessi
     return true;
 }
 
-/* Stores the indices of the values of this rank that other ranks request for their hanging vertices. `requests`
- * contains, for each rank, indices of faces within the message of faces that this rank sent to that rank. */
+/* Stores the groups of equal vertices whose values other ranks request for their hanging vertices. requests: for each
+ * rank, the requested faces, as indices within the message of faces that this rank sent to that rank. mail: all of
+ * these messages. sent: the index in s->faces of each face in them. */
 static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                            const session_mail *requests, session_hanging *out)
 {

@@ -10,9 +10,9 @@
  * faces with the opposite orientation have this vertex as a corner, and all of these faces are smaller. Then the vertex
  * lies between a large cell and small ones. The orientation is tested because of walls along which two meshes overlap:
  * there, a large cell and small ones lie on the same side of the vertex. If the vertex can hang on several faces, the
- * largest one is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's
- * position on it, are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of
- * a mesh group has the face. */
+ * largest one is used. A corner of a face may itself be a hanging vertex on a still larger face. The face, and the
+ * vertex's position on it, are determined from coordinates alone, with the same result on all ranks, regardless of
+ * which mesh of a mesh group has the face. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
@@ -46,9 +46,9 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
 insitu_status session_update_hanging_vertices(const session_hanging_basis *basis, const session_team *team,
                                               base_error *error);
 
-/* Sets the value of each hanging vertex to the value that is interpolated on its face. `means` contains one value per
- * group. If a face's own values are not finite, its hanging vertices keep their values. Collective; all ranks return
- * the same status. */
+/* Sets the value of each hanging vertex to the value interpolated at its position on the face on which it hangs. means:
+ * the value of each group of equal vertices. If a value at a corner of the face is not finite, the hanging vertex keeps
+ * its value. Collective; all ranks return the same status. */
 insitu_status session_constrain_hanging_vertices(const session_hanging *hanging, const session_team *team,
                                                  double *means, base_error *error);
 

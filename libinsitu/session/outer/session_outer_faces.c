@@ -35,7 +35,8 @@ enum { MOST_TABLES = 4 };
 
 /* The data that the search stores for one part of the mesh. */
 typedef struct part_cells {
-    /* the cells that are searched: those of the mesh or, if the mesh is split into pieces, the corner cells */
+    /* the cells that are searched: those of the mesh or, if the mesh is split into pieces, the linear cells with the
+     * corners of the caller's cells (session_corner_cells.h) */
     const grid *grid;
     session_corner_cells corners;
     /* for each of the corner cells, its first piece; a final entry marks the end. NULL: the mesh is not split */
@@ -70,6 +71,7 @@ typedef struct face_search {
     /* array indexed by the lowest bits of a vertex's hash: exclusive or of the sums of all vertices with these bits.
      * Vertices at the same position have equal hashes and are thereby treated as one vertex. */
     uint64_t *hash_sums;
+    /* mask of the lowest bits of a vertex's hash, which are its index in hash_sums */
     uint64_t mask;
     unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if an outer face may contain the vertex */
     int64_t count;
@@ -200,8 +202,9 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
             add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
 }
 
-/* Adds the hashes of all faces of a cell whose type has a table of faces. If two vertices of the cell have the same
- * hash, its faces have fewer vertices than in the table; then nothing is added and false is returned. */
+/* Adds the hashes of the faces of a cell whose type has a table of faces, as add_faces() does. If two vertices of the
+ * cell have the same hash, its faces have fewer vertices than in the table; then nothing is added and false is
+ * returned. */
 static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
 {
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
@@ -223,7 +226,7 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
     return true;
 }
 
-/* Adds the hashes of the cell's faces. */
+/* Adds, by exclusive or, the hash of each of the cell's faces to the sums of the face's vertices. */
 static void add_faces(const xor_table *x, int64_t cell)
 {
     const grid *g = x->part->grid;
@@ -410,6 +413,7 @@ static bool is_shell(const face_search *s, const found_face *face)
     return grid_is_shell_type(grid_cell_type(s->cells[face->part].grid, face->face.cell));
 }
 
+/* Removes the faces whose key occurs several times on this rank, except shells. */
 static void keep_single_faces(face_search *s)
 {
     int64_t kept = 0;
@@ -568,6 +572,8 @@ static bool count_received_keys(const session_mail *in, int ranks, session_mail 
     return is_done;
 }
 
+/* Removes the faces that other ranks have too, except shells. answers: for each key that this rank has sent, the number
+ * of times that its home rank received it. order: the face of each of these keys. */
 static void drop_shared_faces(face_search *s, const session_mail *answers, const int64_t *order)
 {
     int64_t kept = 0;

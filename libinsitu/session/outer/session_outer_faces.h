@@ -12,7 +12,7 @@ typedef struct session_face_part {
     const session_mesh *mesh;
     session_outer *outer; /* receives the faces; its threshold selects the cells. NULL: see `masks` */
     /* if `outer` is NULL and the mesh is split: one byte per cell of the caller, which receives a bit mask of the
-     * cell's outer faces, in the order of session_shape.faces */
+     * cell's outer faces; bit f stands for session_shape.faces[f] */
     unsigned char *masks;
     /* one byte per vertex: the search sets it to 1 if the vertex is on a face that belongs to only one cell of this
      * rank; NULL: not requested */

@@ -317,6 +317,7 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
     for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->positions[i]);
 }
 
+/* Appends the rim of a face of the caller's cell to the loops. Returns the index of the new loop in out->loops. */
 static int64_t add_rim(outer_work *w, int64_t cell, int face)
 {
     const session_rim_kind *of = session_rims_of(&w->rims, cell);
@@ -437,9 +438,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Increases the upper bounds of array sizes in *most by the space for the rims of those cells of the caller that have
- * outer faces. A rim is stored as a loop. It may need further vertices too, because some of its nodes may lie on no
- * outer face. */
+/* Adds the space for the rims of the caller's cells that have outer faces to the upper bounds in *most. A rim is stored
+ * as a loop. It may also need further vertices, because some of its nodes may lie on no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;
@@ -549,7 +549,8 @@ static bool finish_normals(outer_work *w, session_scalar *scalar)
     return scalar->gradient_indices != NULL;
 }
 
-/* Completes the mesh. Its scalar takes ownership of the array of values. Returns false if memory runs out. */
+/* Completes the outer mesh. Its scalar takes ownership of w->heights and w->normals. Returns false if memory runs
+ * out. */
 static bool finish_mesh(const session_mesh *whole, outer_work *w)
 {
     session_mesh *out = w->out->mesh;

@@ -4,8 +4,8 @@
  * The new mesh has a tet on each triangle and a pyramid on each quad, which extend into the cell of the face. Faces
  * with more corners are divided into triangles first. The new mesh has a scalar that is 0 at the vertices of faces and
  * -1 at the apexes, so that the faces are the isosurface 0. The renderer intersects rays with it as with other
- * isosurfaces. The depth of a face in the picture does not depend on the apex, because a ray's intersection with a face
- * is computed from the face's vertices alone. */
+ * isosurfaces. The point at which a ray intersects a face is computed from the face's vertices alone, so that it does
+ * not depend on the apex. */
 #ifndef SESSION_OUTER_MESH_H
 #define SESSION_OUTER_MESH_H
 

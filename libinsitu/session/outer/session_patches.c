@@ -148,6 +148,9 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
 
 /* cells of the faces, by owner and neighbour ------------------------------------------------------------------- */
 
+/* Checks that a face is on the boundary and is given only once, and sets p->is_drawn[f]. i: index of the face in the
+ * patch; f: its index among the faces of all patches. is_taken: one bit per face of the mesh, set for the faces that
+ * have been checked before. */
 static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
                                  base_error *error)
 {
@@ -255,6 +258,7 @@ static bool find_face_key(const cell_search *s, const patch_faces *p, const sess
     return true;
 }
 
+/* Counts, for each key, the cells that have a face with this key, and records whether one of them is drawn. */
 static void count_cells(cell_search *s, const patch_faces *p)
 {
     const grid *g = &p->mesh->cells;
@@ -272,6 +276,7 @@ static void count_cells(cell_search *s, const patch_faces *p)
     }
 }
 
+/* Checks that each given face is on the boundary and is given once for each cell that has it, and sets p->is_drawn. */
 static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;

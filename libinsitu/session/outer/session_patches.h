@@ -13,6 +13,7 @@ typedef struct session_vertex_numbers {
      * with this key */
     const session_key_table *keys;
     const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
+    /* set if keys are global vertex ids, and not coordinates */
     bool by_id;
 } session_vertex_numbers;
 
@@ -24,8 +25,8 @@ typedef struct session_patch_values {
     double *values;
 } session_patch_values;
 
-/* Collects the finite values that the field's patches have on faces of drawn cells. A face is an error if the mesh does
- * not have it, if two cells share it, or if it is given twice. Local. */
+/* Collects the finite values that the field's patches have on faces of drawn cells. It is an error if the mesh does not
+ * have a face of a patch, if two cells share the face, or if the face is given twice. Local. */
 insitu_status session_find_patch_values(const session_mesh *mesh, int field, int component,
                                         const session_vertex_numbers *numbers, session_patch_values *out,
                                         base_error *error);

@@ -135,6 +135,7 @@ static bool receive_corners(twin_search *s, const session_mail *in)
 
 /* ---- least positions of twins ------------------------------------------------------------------------------------ */
 
+/* Finds, for each vertex of this rank, the lexicographically smallest position of the corners that are equal to it. */
 static void find_least_corners(twin_search *s)
 {
     for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {

@@ -2,8 +2,8 @@
  *
  * Codes compute the vertex positions of each block or level from its own origin and spacing, so that the positions of a
  * vertex in two meshes differ in the last bits. All twins on outer faces are given the lexicographically least of their
- * positions. Vertices are twins if their distance is below 1e-5 of the shortest edge of faces at one of them, or below
- * the rounding errors of coordinates. */
+ * positions. Two vertices are twins if their distance is at most 1e-5 of the shortest edge of outer faces at one of
+ * them. If the rounding errors of coordinates are larger, they replace this limit, up to a quarter of the edge. */
 #ifndef SESSION_TWINS_H
 #define SESSION_TWINS_H
 
