@@ -579,7 +579,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     return INSITU_OK;
 }
 
-/* ---- homes ----------------------------------------------------------------------------------------------------- */
+/* ---- home ranks ------------------------------------------------------------------------------------------------ */
 
 /* Computes two hashes for this rank's parts of a mesh: hashes[0] from the stamps at which their cells last changed,
  * hashes[1] from the stamps at which their coordinates last changed. Both are 0 if this rank has no part. The caller

@@ -67,7 +67,7 @@ static insitu_type choose_conformed_type(const conform_array *of, bool has_map, 
     return as;
 }
 
-/* ---- filling ------------------------------------------------------------------------------------------------- */
+/* ---- filling the copies -------------------------------------------------------------------------------------- */
 
 static int64_t read_integer(insitu_type type, const char *p)
 {
@@ -145,7 +145,7 @@ void session_fill_conformed(session_mesh *mesh, int threads)
     }
 }
 
-/* ---- making space --------------------------------------------------------------------------------------------- */
+/* ---- allocating the copies ------------------------------------------------------------------------------------ */
 
 static unsigned char byte_of_type(int type)
 {

@@ -107,7 +107,7 @@ static void compute_simplex_derivatives(term_list *list)
         }
 }
 
-/* ---- terms ----------------------------------------------------------------------------------------------------- */
+/* ---- terms of derivatives -------------------------------------------------------------------------------------- */
 
 int session_find_missing_node_directions(int type, const int at[3], int directions[3][3])
 {

@@ -282,7 +282,7 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
     return true;
 }
 
-/* ---- choices ----------------------------------------------------------------------------------------------------- */
+/* ---- counts of cells of higher order ----------------------------------------------------------------------------- */
 
 void session_drop_vertex_ids(const session_meshes *meshes)
 {
@@ -389,7 +389,7 @@ insitu_status session_count_higher_order_cells(session_meshes *meshes, const ses
     return status;
 }
 
-/* ---- marks ------------------------------------------------------------------------------------------------------- */
+/* ---- marks of refined cells -------------------------------------------------------------------------------------- */
 
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts)
 {

@@ -35,7 +35,7 @@ static int find_lexicographic_index(const session_nodes *of, const int at[3])
     return session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
 }
 
-/* ---- weights --------------------------------------------------------------------------------------------------- */
+/* ---- weights of interpolation ---------------------------------------------------------------------------------- */
 
 /* Computes the weights of a line: the values of its Lagrange polynomials at the nodes of the finer lattice. */
 static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)

@@ -411,7 +411,8 @@ typedef struct session_mesh {
 /* The caller's fill function that is running (session_filled.h). */
 typedef struct session_filling {
     const char *mesh, *field; /* names of the mesh and the field that it fills; NULL: no fill function is running */
-    base_error refused_error; /* error of the first call of the session that the fill function made */
+    /* error of the first call to this session that the fill function made; such calls are refused */
+    base_error refused_error;
 } session_filling;
 
 /* All meshes of this rank. */

@@ -8,8 +8,8 @@
 #include "session_deviation.h"
 
 /* Makes the sets of the marked cells, whose edges between two nodes are divided into `parts` pieces. The sets contain
- * one piece at each of a cell's own nodes, because ranges of all fields contain the values there. All pieces of other
- * cells are made. Local. The caller must drop *out even after an error. */
+ * one piece at each of a cell's own nodes, so that the ranges of all fields include the values at these nodes. All
+ * pieces of other cells are made. Local. The caller must drop *out even after an error. */
 insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
                                       session_piece_set *out, base_error *error);
 

@@ -182,7 +182,7 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
     return bad < cells ? describe_index(w, bad, error) : INSITU_OK;
 }
 
-/* ---- pieces ---------------------------------------------------------------------------------------------------- */
+/* ---- pieces of the cells --------------------------------------------------------------------------------------- */
 
 /* Computes, for each midpoint of a serendipity cell, the number of midpoints before it in the lexicographic order of
  * positions; midpoints at equal positions have equal numbers. */
@@ -421,7 +421,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     return status;
 }
 
-/* ---- counts ---------------------------------------------------------------------------------------------------- */
+/* ---- counts of the caller's cells ------------------------------------------------------------------------------ */
 
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
 {

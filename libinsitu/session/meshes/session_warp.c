@@ -66,7 +66,7 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
     }
 }
 
-/* ---- moving ------------------------------------------------------------------------------------------------------ */
+/* ---- moving the vertices ----------------------------------------------------------------------------------------- */
 
 /* Returns the type of the moved coordinates along an axis. If the caller gives no z coordinates, the moved ones get the
  * type of the x coordinates. */

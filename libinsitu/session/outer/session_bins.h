@@ -25,7 +25,8 @@ void session_bins_free(session_bins *bins);
 typedef struct session_bin_walk {
     const session_bins *bins;
     int64_t first_bin[3], last_bin[3]; /* range of bins that the box touches, along each axis */
-    int64_t bin[3];                    /* first bin, along the first axis, of the row of bins that is visited */
+    /* indices of the first bin of the row that is visited; rows of bins extend along the first axis */
+    int64_t bin[3];
     /* range, in session_bins.items, of the points of the current row that have not been visited */
     int64_t next, end;
 } session_bin_walk;

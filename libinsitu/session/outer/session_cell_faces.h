@@ -36,6 +36,7 @@ typedef struct session_cell_faces {
     /* the faces of the cell's type; NULL for polyhedra, and for shells except those of a lattice */
     const session_face_table *table;
     int64_t count;
+    /* the cell's vertices, if `table` is given */
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     int64_t first; /* index of the cell's first entry in the connectivity */
     int64_t size;  /* number of the shell's vertices, if the cell is a shell; otherwise 0 */

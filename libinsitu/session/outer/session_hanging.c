@@ -502,7 +502,7 @@ static bool find_contacts(hanging_search *s)
     return is_done;
 }
 
-/* ---- results -------------------------------------------------------------------------------------------------- */
+/* ---- storing the hanging vertices ----------------------------------------------------------------------------- */
 
 /* Requests the values of received faces on which vertices hang: packs the message indices of these faces, for the
  * ranks that sent them. *firsts receives, for each face, the index of its first value among the values that will be
@@ -567,7 +567,7 @@ static bool store_requests(const hanging_search *s, const session_mail *mail, co
     return true;
 }
 
-/* ---- search --------------------------------------------------------------------------------------------------- */
+/* ---- search for hanging vertices ------------------------------------------------------------------------------ */
 
 /* Finds the hanging vertices, also on faces of other ranks. Errors that occur only on this rank are stored in *error
  * and not returned. */
@@ -631,7 +631,7 @@ insitu_status session_update_hanging_vertices(const session_hanging_basis *basis
     return INSITU_OK;
 }
 
-/* ---- values --------------------------------------------------------------------------------------------------- */
+/* ---- values at hanging vertices ------------------------------------------------------------------------------- */
 
 /* Sets the value of each hanging vertex to the value of the face at the vertex's position, interpolated from the values
  * at the face's corners. Returns whether a value changed. */

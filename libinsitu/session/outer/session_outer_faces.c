@@ -106,7 +106,7 @@ static int64_t count_part_vertices(const part_cells *p)
     return p->grid->cell_count ? p->grid->vertex_count : 0;
 }
 
-/* ---- keys ---------------------------------------------------------------------------------------------------- */
+/* ---- keys of faces ------------------------------------------------------------------------------------------- */
 
 /* Returns whether the face's i-th vertex differs from all earlier vertices of the face. A repeated vertex is counted
  * once, so that a quad with two corners at the same position is a triangle. */

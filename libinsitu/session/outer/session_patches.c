@@ -309,7 +309,7 @@ static insitu_status check_faces_by_cells(patch_faces *p, base_error *error)
     return status;
 }
 
-/* ---- values ------------------------------------------------------------------------------------------------------ */
+/* ---- values of the patches --------------------------------------------------------------------------------------- */
 
 static grid_field find_patch_field(const patch_faces *p, int patch, int component)
 {

@@ -32,6 +32,7 @@ typedef struct twin_search {
     int64_t corner_count, vertex_count;
     face_corner *corners;    /* the corners of this rank's outer faces, followed by the received corners */
     border_vertex *vertices; /* vertices of all parts, sorted by part */
+    /* upper bound of the rounding errors of coordinates */
     double rounding;
     session_bins bins;
 } twin_search;

@@ -64,7 +64,7 @@ typedef struct target {
     session_gradient_bounds bounds;
 } target;
 
-/* ---- integers ------------------------------------------------------------------------------------------------ */
+/* ---- rounding to integers ------------------------------------------------------------------------------------ */
 
 /* Returns the power of two by which numbers up to `largest` are multiplied, so that they fit into HIGH_BITS bits.
  * Returns 0 if `largest` is 0 or too small; all products are then 0. */
@@ -140,7 +140,7 @@ void session_compute_mean_gradients(const int64_t *sum, int field_count, const s
         for (int a = 0; a < 3; a++) out[f][a] = weight > 0 ? numbers[3 * f + a] / weight * scale : (double)NAN;
 }
 
-/* ---- corners ------------------------------------------------------------------------------------------------- */
+/* ---- contributions of corners -------------------------------------------------------------------------------- */
 
 static inline bool is_before(const node *a, const node *b)
 {

@@ -111,7 +111,7 @@ void session_share_derived_values(const session_meshes *meshes, const char *name
         if (meshes->items[i]->source && meshes->items[i]->is_given) share_derived_field(meshes->items[i], name);
 }
 
-/* ---- images ------------------------------------------------------------------------------------------------------ */
+/* ---- mirror images ----------------------------------------------------------------------------------------------- */
 
 static void update_image(const scene_mirror *mirror, session_meshes *meshes, session_mesh *source, int axes,
                          int threads, base_error *error)
