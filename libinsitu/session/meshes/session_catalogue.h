@@ -130,8 +130,8 @@ typedef struct session_mesh_group {
     session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
-    /* hash of session_catalogue_mesh.positions_hash of all its meshes, which differs after coordinates of any of them
-     * have changed; 0: not computed yet */
+    /* hash of session_catalogue_mesh.positions_hash of all meshes of the mesh group; it changes if coordinates of any
+     * of these meshes change; 0: not computed yet */
     uint64_t positions_hash;
     /* home ranks, if the mesh group has several meshes; for a single mesh, session_catalogue_mesh.homes is used
      * instead */

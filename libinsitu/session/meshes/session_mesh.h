@@ -99,7 +99,8 @@ typedef struct session_scalar {
     int interval_count;
     mmbvh_interval *intervals;
     session_plane plane; /* the plane from which distances are computed */
-    float *distances;    /* distance of each vertex; NULL: not computed yet. insitu_report lists it as a copy */
+    /* signed distance of each vertex from the plane; NULL: not computed yet. insitu_report lists them as a copy */
+    float *distances;
     /* cell values recentred to vertices; NULL: not computed yet. insitu_report lists them as a copy */
     double *vertex_values;
     /* if the values are recentred, the cell or corner values from which they are computed */

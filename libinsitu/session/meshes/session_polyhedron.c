@@ -1,7 +1,7 @@
-/* The distance between the samples of volumes depends on the mean size of cells, which is computed from their volumes.
- * Therefore a cell's volume must depend only on the cell's geometry, and not on the order in which faces and vertices
- * are listed, which may differ between ranks. Volumes may still differ by rounding, but the mean size does not, because
- * it is rounded to few bits (session_space.c). */
+/* The distance between the samples that a ray takes in a volume depends on the mean size of cells, which is computed
+ * from the volumes of the cells. Therefore a cell's volume must depend only on the cell's geometry, and not on the
+ * order in which faces and vertices are listed, which may differ between ranks. Volumes may still differ by rounding,
+ * but the mean size does not, because it is rounded to few bits (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>

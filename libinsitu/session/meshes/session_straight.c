@@ -10,7 +10,7 @@
 
 /* Largest distance of a node of a straight cell from its position in the linear cell with the same corners. It is a
  * fraction of the extent of the cell's corners divided by the order. The slope of a face is then wrong by at most about
- * 1e-4 times a small factor that depends on the order, which is less than one of 255 levels of brightness. */
+ * 1e-4 times a small factor that depends on the order. This error is less than one of 255 levels of brightness. */
 static const double slack = 1e-4;
 
 /* For cells of one type with one number of nodes: the positions that their nodes have in the linear cell with the same

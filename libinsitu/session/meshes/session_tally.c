@@ -408,8 +408,7 @@ bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally)
     return true;
 }
 
-/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice to the sums. These cells are boxes, or are
- * flat. */
+/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice to *tally. These cells are boxes, or are flat. */
 static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;

@@ -232,8 +232,8 @@ static bool bin_candidates(hanging_search *s)
 
 typedef enum face_state {
     FACE_UNREAD,
-    /* the face must be read: a candidate that is not one of its corners is near it, or it intersects another rank's
-     * box */
+    /* the face must be read: a candidate that is not a corner of the face is near it, or the face intersects another
+     * rank's box */
     FACE_NEEDED,
     FACE_READ
 } face_state;

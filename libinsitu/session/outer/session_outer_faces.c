@@ -48,7 +48,8 @@ typedef struct part_cells {
     int64_t first_cell;   /* index of the part's first cell if the cells of all parts are numbered consecutively */
     int64_t first_vertex; /* index of the part's first vertex if the vertices of all parts are numbered consecutively */
     uint64_t *hashes;     /* hash of each vertex's position or global id */
-    /* one byte per vertex, nonzero if its sum of hashes is not 0, so that an outer face may contain it */
+    /* one byte per vertex, nonzero if the vertex's sum of hashes is not 0, so that an outer face may contain the
+     * vertex */
     unsigned char *may_be_outer;
 } part_cells;
 

@@ -282,8 +282,8 @@ static bool find_common_apex(const face_polygon *p, double out[3])
 }
 
 /* Computes the polygon's normal. It points to the side of the polygon on which the point `inside` lies. If this point
- * is in the polygon's plane, the component of largest magnitude is positive. The normal's length is about the polygon's
- * width. */
+ * is in the polygon's plane, the normal's component of largest magnitude is positive. The normal's length is about the
+ * polygon's width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};

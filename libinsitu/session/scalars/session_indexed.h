@@ -15,7 +15,7 @@ void session_clear_requested_fields(const session_meshes *meshes);
 /* Both functions copy values into the order of the mesh by their index, unless the copy is up to date.
  * session_copy_requested_fields() copies the fields that statistics need, and clears their marks.
  * session_copy_used_fields() copies the fields of scalars in use, and the fields from which derived fields are
- * computed. They must be called before the values are read. Local. */
+ * computed. Both functions must be called before the values are read. Local. */
 insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error);
 

@@ -17,8 +17,8 @@ enum { ALL_AXES = 7 };
 
 /* ---- fields ------------------------------------------------------------------------------------------------------ */
 
-/* The fill function of a mirror image's field. It fills the source's field first, and returns the values of that
- * field. */
+/* The fill function of a mirror image's field. It returns the values, or the error, of the call of the source's fill
+ * function in this step. If that function has not been called, *field is not changed. */
 static insitu_status copy_source_values(void *of_image, insitu_field *field)
 {
     session_mesh *image = of_image;

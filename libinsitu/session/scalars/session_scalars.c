@@ -28,8 +28,8 @@ static uint64_t find_mesh_group_name(const session_mesh *mesh, const scene_field
     return mesh->single_group_name ? mesh->single_group_name : field->mesh_group_name;
 }
 
-/* Returns the scalar of the mesh with these properties; NULL if there is none. mesh_group_name: the group over which a
- * recentred scalar is averaged; ignored for others. */
+/* Returns the scalar of the mesh with these properties; NULL if there is none. mesh_group_name: hash that identifies
+ * the mesh group over which a recentred scalar is averaged; ignored for other scalars. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
                                    uint64_t mesh_group_name)
 {
