@@ -34,8 +34,8 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    /* working memory of two phases: first one number per recentring of an input, then one number per mesh, which is
-     * nonzero if the values there are out of date on some rank */
+    /* first one number per recentring of an input, as working memory of session_recentre(); then one number per mesh of
+     * the catalogue, which is nonzero if the derived values on the mesh are out of date on some rank */
     int *stale;
 } derive_work;
 
@@ -52,7 +52,7 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
 }
 
 /* Iterates over this rank's parts of a mesh that have the field:
- *     for (part_visit v = visit_parts(w, mesh); next_visited_part(w, &v);) use(v.part, v.index); */
+ *     for (part_visit v = visit_parts(w, mesh); next_visited_part(w, &v);) use(v.part, v.field_index); */
 typedef struct part_visit {
     session_parts parts;
     int next_index;
@@ -181,8 +181,8 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
     return hash | 1;
 }
 
-/* Finds the meshes on which the values are out of date on some rank. *error may hold an earlier error of this rank.
- * Collective; all ranks return the same status. */
+/* Finds the meshes on which the derived values are out of date on some rank, and stores them in w->stale. *error may
+ * hold an earlier error of this rank. Collective; all ranks return the same status. */
 static insitu_status find_stale_meshes(derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
@@ -202,7 +202,8 @@ static insitu_status find_stale_meshes(derive_work *w, base_error *error)
 
 /* ---- values of one mesh ------------------------------------------------------------------------------------------ */
 
-/* Returns the values of an input or of one of its components, with the centring of the derived field. */
+/* Returns a component of an input (grid_field.component) with the centring of the derived field: the values recentred
+ * to vertices if the input has cell values but the derived field does not, and otherwise the input's own values. */
 static grid_field find_input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                     int input, int component)
 {
@@ -282,7 +283,7 @@ static void load_block(const grid_field *field, int64_t first, int count, double
 
 /* A thread's buffers for evaluating an expression on one block of points. */
 typedef struct block_buffer {
-    const double **inputs;
+    const double **inputs; /* for each input, pointer to its values on the block, within `values` */
     /* memory for the values of the inputs on the block, followed by the stack of the expression's program */
     double *values;
 } block_buffer;
@@ -467,8 +468,8 @@ static insitu_status begin_sums(const derive_work *w, const session_mesh_group *
     return session_key_all_vertices(sums, error);
 }
 
-/* Computes the gradients over the meshes of a group. Collective. An error of this rank after the last communication is
- * only stored in *error. */
+/* Computes the derived field from gradients on all meshes of a group. Collective. An error of this rank after the last
+ * communication is only stored in *error. */
 static insitu_status derive_mesh_group(const derive_work *w, const session_mesh_group *mesh_group, base_error *error)
 {
     session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars(w, mesh_group)};
@@ -494,7 +495,7 @@ static bool is_mesh_group_stale(const derive_work *w, const session_mesh_group *
     return is_stale;
 }
 
-/* Computes the gradients of the field for each group of meshes on which it exists, unless they are up to date. */
+/* Computes the derived field from gradients on each group of meshes on which the field exists and is out of date. */
 static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;

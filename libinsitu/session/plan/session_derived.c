@@ -19,8 +19,8 @@ static uint64_t find_derived_field_bit(const scene *scene, const scene_field *fi
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
-/* Adds to the set of needed fields the derived fields on which they depend. A field depends only on fields before it in
- * the scene's list. */
+/* Adds to the set of needed derived fields all derived fields on which they depend. A derived field depends only on
+ * those before it in the scene's list. */
 static uint64_t add_source_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
@@ -76,10 +76,11 @@ void session_mark_source_fields(const scene *scene, uint64_t needed, const sessi
 
 /* ---- faults of a derived field on a mesh ---------------------------------------------------------------------- */
 
+/* A derived field on a mesh, for checks and messages. */
 typedef struct derived_on_mesh {
     const char *scene_path;
     const scene_derived *derived;
-    /* first_mesh: the first mesh of the catalogue on which the field exists */
+    /* first_mesh: start of the catalogue's array of meshes, which contains `mesh` */
     const session_catalogue_mesh *mesh, *first_mesh;
 } derived_on_mesh;
 

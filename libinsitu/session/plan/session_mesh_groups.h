@@ -10,9 +10,9 @@
 #include "scene.h"
 #include "session_catalogue.h"
 
-/* Creates the mesh groups of all layers and derived fields of the scene, and stores their names in the fields, unless
- * they are up to date. Frees values that were averaged to vertices over groups that no longer exist. Local; the same on
- * every rank. An error is stored in *error. */
+/* Creates the mesh groups of all layers and derived fields of the scene, unless they are up to date. Stores the names
+ * of the groups in scene_field.mesh_group_name and scene_derived.mesh_group_name. Frees values that were averaged to
+ * vertices over groups that no longer exist. Local; the same on every rank. An error is stored in *error. */
 void session_group_meshes(scene *scene, session_catalogue *catalogue, session_meshes *meshes, base_error *error);
 
 #endif

@@ -49,8 +49,8 @@ typedef struct value_groups {
 /* One of this rank's parts of the meshes whose values are recentred. */
 typedef struct mesh_part {
     session_scalar *scalar; /* scalar that gets the recentred values; NULL: the part does not have the field */
-    bool is_of_vertices;
-    grid_field field; /* the values that are averaged to vertices */
+    bool is_of_vertices;    /* set if the field has one value per vertex, and not per cell or corner */
+    grid_field field;       /* the values that are averaged to vertices */
 } mesh_part;
 
 /* The data of one recentring on this rank. mesh_group->groups are the groups of equal vertices. */
@@ -88,12 +88,12 @@ static void groups_free(value_groups *groups)
     *groups = (value_groups){0};
 }
 
-/* Returns the sum of finite values, each multiplied by scale. The bits of the sum do not depend on the order of the
- * values. Each value is split into a multiple of a unit and a remainder. The unit is so coarse that sums of its
- * multiples are exact. The remainder, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and
- * Oishi, Accurate floating-point summation, 2008, section 3). For 100 values, the part that is neglected is below 2^-85
- * of the largest value. Therefore the sum is rounded correctly, unless the exact sum is as close as this to the middle
- * between two doubles. */
+/* Returns the sum of finite values, each multiplied by scale. largest: the largest absolute value. The bits of the sum
+ * do not depend on the order of the values. Each value is split into a multiple of a unit and a remainder. The unit is
+ * so coarse that sums of its multiples are exact. The remainder is exact too; it is rounded to a multiple of a finer
+ * unit, so that the sum of the remainders is also exact (Rump, Ogita and Oishi, Accurate floating-point summation,
+ * 2008, section 3). For 100 values, the part that is neglected is below 2^-85 of the largest value. Therefore the sum
+ * is rounded correctly, unless the exact sum is as close as this to the middle between two doubles. */
 static double sum_values(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -532,8 +532,9 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
     }
 }
 
-/* Returns whether values at hanging vertices must be constrained: some mesh has cell values, or has values at vertices
- * that may hang. Corner values are not constrained, because codes with such values constrain them themselves. */
+/* Returns whether hanging vertices must get the values interpolated on the faces on which they lie. This is the case if
+ * the field has cell or vertex values on some mesh. Corner values are not changed in this way, because codes with such
+ * values interpolate them at hanging vertices themselves. */
 static bool needs_hanging_constraint(const session_recentring *item)
 {
     for (int i = 0; i < item->mesh_group->count; i++)

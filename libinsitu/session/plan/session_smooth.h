@@ -1,4 +1,4 @@
-/* Computes gradients at vertices, for isosurfaces whose normals are interpolated between them. */
+/* Computes gradients at vertices, for isosurfaces whose normals are interpolated between the vertices. */
 #ifndef SESSION_SMOOTH_H
 #define SESSION_SMOOTH_H
 

@@ -19,10 +19,10 @@ static session_key make_key_of_point(const double position[3])
     return key;
 }
 
-/* Assigns the vertices of a part's drawn cells to groups of equal vertices. A twin is a vertex that is equal to
- * another vertex except for rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i
- * for the i-th twin. If vertices are equal by id, one_vertex receives the index of one vertex of each group;
- * otherwise it is NULL. */
+/* Assigns the vertices of a part's drawn cells to groups of equal vertices, and counts the corners in each group in
+ * corner_starts. A twin is a vertex that is equal to another vertex except for rounding (session_twins.h). While this
+ * function runs, group_of_vertex contains -2 - i for the i-th twin. If vertices are compared by id, one_vertex receives
+ * the index of one vertex of each group among the vertices of all parts; otherwise it is NULL. */
 static void group_vertices_of_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
@@ -48,8 +48,8 @@ static void group_vertices_of_part(const groups_basis *basis, int part, session_
     }
 }
 
-/* Groups the vertices of all parts. If vertices are grouped by id, *one_vertex receives an array with the index of one
- * vertex of each group. Returns false if memory runs out. */
+/* Computes the groups of equal vertices of all parts. If vertices are compared by id, *one_vertex receives an array
+ * with the index of one vertex of each group. Returns false if memory runs out. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
     out->first_vertices = base_calloc((size_t)basis->part_count + 1, sizeof *out->first_vertices);

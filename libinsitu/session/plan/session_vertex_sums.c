@@ -1,7 +1,7 @@
 /* A rank has all vertices for which it needs sums, but may lack some of the cells around them. For each of these
  * vertices, it therefore requests partial sums from the ranks whose boxes contain the vertex.
  *
- *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
+ *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own keys
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
  *     shared: <--(sums)--, as integers, so that the order of addition does not matter
  *
@@ -74,10 +74,13 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 
 /* ---- requests to other ranks ----------------------------------------------------------------------------------- */
 
-/* The messages of an exchange of sums. */
+/* The messages of an exchange of sums. A request is a key; the answer to it is the sum for this key on the other
+ * rank. */
 typedef struct sums_messages {
-    double (*positions)[3];
+    double (*positions)[3]; /* position of a vertex for each of this rank's own keys */
     session_mail requests, received_requests, answers, received_answers;
+    /* indices in session_vertex_sums.keys: own_numbers: of each key in `requests`; requested_numbers: of each key in
+     * `received_requests`, or -1 if this rank has no vertex with the key */
     int64_t *own_numbers, *requested_numbers;
 } sums_messages;
 
@@ -92,7 +95,7 @@ static void mail_free(sums_messages *mail)
     base_free(mail->requested_numbers);
 }
 
-/* Finds, for each of this rank's keys, the position of a vertex that has it. */
+/* Finds, for each of this rank's own keys, the position of a vertex that has the key. */
 static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
@@ -140,7 +143,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Ensures that the array has space for `more` keys that other ranks request. They are stored after this rank's own
+/* Enlarges the table of keys by space for `more` keys that other ranks request. These are added after this rank's own
  * keys. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
@@ -225,10 +228,11 @@ static insitu_status send_answers(const session_team *team, session_vertex_sums 
 
 /* ---- sums ---------------------------------------------------------------------------------------------------- */
 
-/* A filter with a few bits of each key, so that most vertices need no search in the table. */
+/* A Bloom filter of the keys in a table: the hash of each key selects one bit, which is set. A vertex whose bit is not
+ * set has no key in the table, so that most vertices need no search there. */
 typedef struct key_filter {
     uint64_t *bits;
-    uint64_t mask;
+    uint64_t mask; /* number of bits - 1; the number of bits is a power of two */
 } key_filter;
 
 static bool filter_create(const session_key_table *keys, key_filter *out)
