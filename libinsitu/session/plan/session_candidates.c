@@ -15,7 +15,7 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
                    (int)SCENE_MAX_VOLUMES == (int)RENDER_MAX_VOLUMES,
                "a scene may have as many surfaces and volumes as can be drawn");
 
-/* visible values -------------------------------------------------------------------------------------------- */
+/* ---- visible values -------------------------------------------------------------------------------------------- */
 
 /* Returns whether the interval was added to the scalar before. This happens if a scene sweeps over fields, because the
  * images of the sweep share their isosurfaces. */
@@ -147,7 +147,7 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
     return true;
 }
 
-/* ---- cells with these values ------------------------------------------------------------------------------------ */
+/* ---- cells with visible values ---------------------------------------------------------------------------------- */
 
 bool session_hash_candidate_queries(const session_mesh *mesh, uint64_t *key)
 {

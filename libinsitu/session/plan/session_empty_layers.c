@@ -33,7 +33,7 @@ typedef struct planned_layer {
     /* range of the layer's values. In the first reduction the range of a surface is [0, 0] if some cell is within the
      * threshold, and otherwise empty (low > high). */
     field_range range;
-    bool is_empty; /* set if no cell is within the surface's threshold */
+    bool is_empty; /* for a surface: set after the first reduction if no cell is within its threshold */
     /* set if the layer shows nothing according to the trees, and no warning has been reported yet */
     bool is_unreported;
 } planned_layer;
@@ -111,7 +111,8 @@ static void widen_range(double low, double high, field_range *range)
     range->negated_high = fmin(range->negated_high, -high);
 }
 
-/* Widens the range by the range of the tree's root. It contains all visible values of the mesh. */
+/* Widens the range by the range of values in the root of the mesh's tree. The root's range contains all values of the
+ * mesh that images can show. */
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -159,8 +160,10 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
 
 /* Further values that are reduced in the same call as the layers' ranges. */
 typedef struct reduced_extras {
-    bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
-    int reporting_word;   /* maximum of all ranks' session_encode_rank_with_warnings() */
+    /* set if, on some rank, other fields than at the last report have cells with values that are not finite
+     * (session_hash_unusable_fields()) */
+    bool has_other_cells;
+    int reporting_word; /* maximum of all ranks' session_encode_rank_with_warnings() */
 } reduced_extras;
 
 /* Reduces the layers' ranges, earlier errors and *extras over all ranks in one call. of_all_cells: the ranges are
@@ -194,8 +197,9 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* Returns the subject of the layer's warning. In a sweep over isovalues each picture has one isovalue. The number in
- * the subject is then the isovalue's index in the scene file's list. */
+/* Returns the identity of the layer's warning. value: index of the isovalue in the layer; 0 for other layers. In a
+ * sweep over isovalues each layer has one isovalue; the warning's number then contains the isovalue's index in the
+ * scene file's list (list_isosurfaces()). */
 static session_warning make_warning(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE

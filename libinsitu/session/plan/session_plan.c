@@ -174,7 +174,8 @@ static const session_catalogue_field *find_drawn_field(const session_catalogue_m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
-/* Checks that some mesh has the field, and that the field has no fault on the meshes on which the layer is drawn. */
+/* Checks that some mesh has the field, and that the field has no fault on the meshes on which the layer is drawn.
+ * layer: the field whose list of meshes (scene_field.meshes) selects these meshes. */
 static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, const scene_field *layer,
                                  base_error *error)
 {
@@ -219,8 +220,8 @@ static void warn_of_grey_isosurface(const session_catalogue *catalogue, const sc
     }
 }
 
-/* Checks the field of a layer's contour lines on the meshes on which the layer is drawn. These are the meshes of the
- * field `on`. */
+/* Checks the field of a layer's contour lines on the meshes on which the layer is drawn. on: the field whose list of
+ * meshes selects these meshes. */
 static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
                                  base_error *error)
 {

@@ -76,7 +76,7 @@ static int compute_digit_shift(int pass)
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* Returns the mask of the bits that earlier passes have determined. */
+/* Returns a mask in which those bits of a value are set that earlier passes have determined. */
 static uint64_t known_bits_mask(int pass)
 {
     return pass ? ~UINT64_C(0) << compute_digit_shift(pass - 1) : 0;
@@ -291,9 +291,10 @@ static insitu_status choose_counted_cells(const session_meshes *meshes, const se
     return status || least[LACKING] == 0 ? status : session_agree(team->comm, error);
 }
 
-/* Finds the digit of the value at a position in the sorted list of values, where each value takes as many positions as
- * its weight. On entry, *rank is the position among the values whose earlier digits are known; on return, it is the
- * position among those of them with the digit found. Returns the digit. */
+/* Returns the next digit of the value at a position in the sorted list of values, in which each value takes as many
+ * positions as its weight. counts: the sum of the weights for each digit, over the values whose earlier digits equal
+ * those found so far. On entry, *rank is the position among these values; on return, it is the position among those of
+ * them that have the returned digit. */
 static int find_digit_at_position(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;

@@ -48,7 +48,7 @@ static int count_layers(const scene_image *image)
     return list.count;
 }
 
-/* ---- the file -------------------------------------------------------------------------------------------------- */
+/* ---- the file of an image's ranges ----------------------------------------------------------------------------- */
 
 /* Stores an error that the file could not be `what` ("read" or "written"), and returns its status. */
 static insitu_status fail_at_file(const session_image_ranges *ranges, const char *what, const file_failure *failure,
@@ -153,7 +153,7 @@ insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error 
     return INSITU_OK;
 }
 
-/* ---- the list -------------------------------------------------------------------------------------------------- */
+/* ---- the ranges of all images ---------------------------------------------------------------------------------- */
 
 static void free_ranges(session_image_ranges *ranges)
 {
@@ -177,7 +177,8 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
-/* Initializes an entry after the end of the list. The caller increments the count when the entry is complete. */
+/* Initializes all->items[all->count] for the image, without ranges. The caller increments all->count when the ranges
+ * have been read. */
 static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);

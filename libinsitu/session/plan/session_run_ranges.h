@@ -5,8 +5,9 @@
  * output: the part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
  * NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became wider, and
  * read when the first picture of the image is drawn, so that a restarted run continues with the ranges of the previous
- * one. A line has: isosurface, surface, slice or volume; the layer's index, from 0, among the image's layers of this
- * type; the component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
+ * one. A line contains, in this order: the layer's type (isosurface, surface, slice or volume); the layer's index, from
+ * 0, among the image's layers of this type; the field's component (scene_field.component); the low and the high end of
+ * the range; and the field's name. Lines that match no layer of the image are ignored. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -29,8 +30,8 @@ typedef struct session_image_ranges {
      * (scene_variant.layers). 0 without a sweep. */
     int layers;
     int count;
-    session_run_range *items;
-    bool is_changed; /* set if a range has changed since the file was written */
+    session_run_range *items; /* one range for each layer whose range widens over the run */
+    bool is_changed;          /* set if a range has changed since the file was written */
 } session_image_ranges;
 
 typedef struct session_run_ranges {

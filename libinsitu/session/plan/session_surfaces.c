@@ -120,8 +120,8 @@ static insitu_status find_outer_faces_of_request(const session_meshes *meshes, c
     return status ? status : session_agree(team->comm, error);
 }
 
-/* Makes the mesh on outer faces ready to be drawn: fills the members that its trees and kernels need. Each cell of this
- * mesh lies behind one outer face. */
+/* Makes the mesh of outer faces ready to be drawn: fills the members that its trees and kernels need, and marks the
+ * mesh as needed. Each cell of this mesh lies behind one outer face. */
 static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, bool has_normals,
                                         base_error *error)
 {

@@ -1,8 +1,8 @@
-/* Converts colour maps to transfer functions. A surface is coloured by the map itself. A volume is integrated over
- * transfer functions whose colours are linear between entries of a table. Other maps are therefore converted to such a
- * table: each band gets 16 entries, so that the colour changes from one band to the next within 1/16 of a band, and
- * each colour outside the range becomes one more entry at an end. Opacity is linear along the map's scale, as the
- * renderer requires. */
+/* Converts colour maps to transfer functions. A surface is coloured by the map itself. The integration of volumes
+ * requires colours that are linear between the entries of a table. For volumes, maps with bands or with colours outside
+ * the range are therefore converted to such a table: each band gets 16 entries, so that the colour changes from one
+ * band to the next within 1/16 of a band, and each colour outside the range becomes one more entry at an end. Opacity
+ * is linear along the map's scale, as the renderer requires. */
 #include "session_transfer.h"
 
 #include <float.h>

@@ -31,8 +31,8 @@ void session_transfer_free(session_transfer *transfer);
  * all values. Local, the same on every rank. */
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
-/* Returns whether the values of a range are so close to each other that their rounding is visible in float32, even
- * after the range's low end was subtracted in double. */
+/* Returns whether a range is so narrow that the colours of its values show rounding errors. This is the case if the
+ * range's width is only a few dozen rounding errors of its values in double, or below the smallest normal float32. */
 bool session_is_range_too_narrow(double low, double high);
 
 #endif

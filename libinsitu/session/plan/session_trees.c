@@ -43,7 +43,7 @@ static void update_rate(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* The data that all updates of trees in a step share, apart from the meshes. */
+/* Data that is the same for all updates of trees in a step. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;
@@ -64,7 +64,8 @@ static session_scalar *find_own_scalar(const session_mesh *mesh)
     return NULL;
 }
 
-/* Returns the scalar whose ranges are stored in the nodes; if there is none, the first scalar that is drawn. */
+/* Returns the scalar whose ranges are stored in the tree's nodes. If there is none yet, chooses the first scalar whose
+ * ranges an image needs, and marks it as this scalar. */
 static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
     session_scalar *own = find_own_scalar(mesh);
@@ -311,7 +312,8 @@ static bool has_new_values(const session_mesh *mesh)
     return false;
 }
 
-/* Returns whether nothing has changed that determines the visible cells, so that the partial tree is still valid. */
+/* Returns whether there is a partial tree that is still valid, because the cells, their vertices, their values and the
+ * queries that select visible cells (key) are unchanged. */
 static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 {
     if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;

@@ -8,7 +8,8 @@
 #include "session_space.h"
 #include "session_team.h"
 
-/* Measured seconds per cell on this rank; 0: not measured yet. */
+/* Measured seconds per cell on this rank: for building a tree, for selecting the candidates of a partial tree, and for
+ * refitting the ranges of a tree. 0: not measured yet. */
 typedef struct session_rates {
     double build, select, refit;
 } session_rates;
@@ -16,11 +17,10 @@ typedef struct session_rates {
 /* The state of trees that does not belong to a single mesh. */
 typedef struct session_trees {
     session_rates rates;
-    /* tree whose leaves are the trees of the meshes; parent_key identifies these trees; empty if there is at most one
-     * of them */
+    /* tree whose leaves are the trees of this rank's parts; it is empty if there are fewer than two such trees */
     mmbvh parent;
-    uint64_t parent_key;
-    bool is_parent_stale;
+    uint64_t parent_key;  /* hash that identifies the set of parts over whose trees `parent` was built */
+    bool is_parent_stale; /* set if a part's tree has changed since `parent` was built */
 } session_trees;
 
 /* Updates the trees of the meshes that are marked as needed: builds or refits those that are out of date. choice: the

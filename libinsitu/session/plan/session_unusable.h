@@ -7,9 +7,9 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns a hash of the pairs of a mesh and a field of the plan's layers for which this rank has cells with values that
- * are not finite; 0 if there are none. The warnings are the same as before if the hash has not changed on any rank.
- * Local. */
+/* Returns a hash of the pairs (mesh, field) for which this rank has cells with values that are not finite; 0 if there
+ * are no such pairs. The fields are those that the plan's isosurfaces and volumes show. The warnings are the same as
+ * before if the hash has not changed on any rank. Local. */
 uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes);
 
 /* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */
