@@ -32,8 +32,8 @@
 enum {
     LANES = 4,  /* number of points whose sums are computed together */
     BLOCK = 32, /* maximum number of points in a block */
-    /* maximum number of doubles that the stored functions of a factor may take; larger ones are computed again for each
-     * cell */
+    /* maximum number of doubles of session_rule_factor.functions; if a factor needs more, its functions are computed
+     * again for each cell */
     MOST_FUNCTIONS = 1 << 20,
     MOST_TET_POINTS = 17, /* maximum number of points along an axis of bent tets; higher if straight tets need more */
     SIZE = 4,             /* number of doubles of a tuple: x, y, z and a value */
@@ -67,7 +67,8 @@ static int count_line_points(const session_nodes *of, bool is_bent)
 
 /* ---- functions of nodes ---------------------------------------------------------------------------------------- */
 
-/* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. */
+/* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. out[n * stride] receives
+ * the value for node n, and out[n * stride + slopes] the derivative. */
 static void find_line_functions(const session_rule_factor *factor, const double *nodes, double at, double *out,
                                 int stride, int slopes)
 {
@@ -84,8 +85,9 @@ static void find_line_functions(const session_rule_factor *factor, const double 
     }
 }
 
-/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their
- * derivatives along each axis. */
+/* Computes Silvester's functions (the Lagrange polynomials of equispaced nodes, session_derivatives.c) of a triangle or
+ * tet at a point, and their derivatives along each axis. out[n * stride] receives the value for node n, and out[n *
+ * stride + k * slopes] the derivative along axis k = 1, 2 or 3. */
 static void find_simplex_functions(const session_rule_factor *factor, const double at[3], double *out, int stride,
                                    int slopes)
 {
@@ -335,8 +337,9 @@ static void visit_first(const cell_visit *v, double weight)
     }
 }
 
-/* Evaluates one component at a point of a line, for `size` positions at once. functions: the values of the line's
- * functions at the point, line->width doubles apart. */
+/* Interpolates one component at a point of a line. The component is given at the line's nodes, as an array of `size`
+ * numbers for each node; `out` receives `size` numbers. functions: the values of the line's nodal functions at the
+ * point, line->width doubles apart. */
 static void sum_line(const session_rule_factor *line, const double *functions, size_t size, const double *restrict in,
                      double *restrict out)
 {

@@ -1,5 +1,5 @@
-/* Integrals over cells of higher order, of the polynomials of their positions and values. The row of a cell is its list
- * of nodes in the connectivity. A complete cell has all nodes of the regular grid of its order (session_nodes.h). */
+/* Computes integrals over cells of higher order, in which positions and values are polynomials. A complete cell has all
+ * nodes of the regular grid of its order (session_nodes.h). */
 #ifndef SESSION_CELL_RULES_H
 #define SESSION_CELL_RULES_H
 
@@ -7,14 +7,15 @@
 #include "session_quadrature.h"
 
 /* The nodal functions on a line, triangle or tet, and a quadrature rule at whose points they are evaluated. The nodal
- * functions of a cell are products of such functions. */
+ * function of a node is the polynomial that is 1 at this node and 0 at all other nodes. The nodal functions of a cell
+ * are products of such functions. */
 typedef struct session_rule_factor {
     int order, node_count;
     bool is_lobatto; /* set if the nodes of a line are Gauss-Lobatto points */
     session_quadrature rule;
     int width; /* number of points in each block; the last block may have fewer */
-    /* for each block of points: values of the functions, then their slopes along each axis, as arrays of node_count x
-     * width. NULL: the functions take too much memory and are computed again for each cell */
+    /* for each block of points: values of the nodal functions, then their derivatives along each axis, as arrays of
+     * node_count x width. NULL: the arrays would take too much memory, and are computed again for each cell */
     double *functions;
 } session_rule_factor;
 
@@ -49,15 +50,17 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                              session_cell_rules *out);
 void session_drop_cell_rules(session_cell_rules *rules);
 
-/* Receives some points of a cell. measures: the weight of each point times the determinant of the map's Jacobian, or
- * times the area element of a shell; values: the polynomial's values. */
+/* Function that receives `count` quadrature points of a cell. of: the pointer that was passed to session_visit_cell();
+ * measures: for each point, its weight times the determinant of the map's Jacobian, or times the area element of a
+ * shell; values: for each point, the value of the cell's polynomial. */
 typedef void session_visit_points(void *of, int count, const double *measures, const double *values);
 
 /* Returns the number of doubles that session_visit_cell() needs as working memory. */
 size_t session_cell_rules_work_size(const session_cell_rules *rules);
 
-/* Visits the quadrature points of a cell, always in the same order. tuples: x, y, z and a value at each of the cell's
- * nodes, in the order of its nodes in connectivity. work: session_cell_rules_work_size() doubles of working memory. */
+/* Calls `visit` for the quadrature points of a cell, always in the same order. tuples: x, y, z and a value at each of
+ * the cell's nodes, in the order of its nodes in connectivity. work: session_cell_rules_work_size() doubles of working
+ * memory. of: pointer that is passed to `visit`. */
 void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
                         session_visit_points *visit, void *of);
 

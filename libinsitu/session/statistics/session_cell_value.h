@@ -1,4 +1,4 @@
-/* The contribution of one cell to the statistics of a field. */
+/* Defines the data of one cell that the statistics of a field need. */
 #ifndef SESSION_CELL_VALUE_H
 #define SESSION_CELL_VALUE_H
 
@@ -9,12 +9,14 @@ typedef struct session_cell_value {
      * which has no volume */
     bool is_counted, is_shell;
     /* true: the value is a polynomial that varies in the cell, so that `mean` may lie outside minimum .. maximum, and
-     * each bin gets a part of the cell's volume */
+     * each bin of a histogram gets a part of the cell's volume */
     bool is_integral;
     double minimum, maximum; /* range of the values at the vertices or nodes, or the single value of the cell */
-    double mean;             /* the cell's value, or the mean of its values */
-    double half_deviation;   /* half the standard deviation of the value in the cell; the half cannot overflow */
-    double volume;           /* volume of the cell, or area if it is a shell */
+    /* the single value of the cell, the mean of the values at its vertices or, if is_integral is set, the integral of
+     * the polynomial divided by the volume */
+    double mean;
+    double half_deviation; /* half the standard deviation of the value in the cell; the half cannot overflow */
+    double volume;         /* volume of the cell, or area if it is a shell */
 } session_cell_value;
 
 /* Reads a linear cell. Its mean is the mean of the values at its vertices. */

@@ -19,7 +19,8 @@ typedef struct session_events {
     uint64_t drawn_images;    /* images that have been drawn by this session */
 } session_events;
 
-/* The statistics and images of the scene that can be computed in a step without an error, with one bit for each. */
+/* One bit for each of the statistics and images of the scene file. The bit is set unless the field of the statistics,
+ * or of the image's condition, does not exist or has an error in this step (session_check_event_fields()). */
 typedef struct session_valid_events {
     uint64_t statistics, images;
 } session_valid_events;

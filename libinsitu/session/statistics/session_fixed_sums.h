@@ -1,7 +1,7 @@
-/* Sums of fractions in fixed point, which are the same for any order of summation, and histograms of such sums. A
- * fraction is multiplied by 2^52 and rounded to an integer. A sum consists of two words: the sum of these integers
- * divided by 2^28 (rounded down), and the sum of the remainders. Therefore 2^34 fractions can be added without
- * overflow. */
+/* Computes sums of fractions in fixed point, which are the same for any order of summation, and histograms of such
+ * sums. A fraction is multiplied by 2^52 and rounded to an integer. This integer is divided by 2^28. A sum consists of
+ * two words: the sum of the quotients (rounded down), and the sum of the remainders. Therefore 2^34 fractions can be
+ * added without overflow. */
 #ifndef SESSION_FIXED_SUMS_H
 #define SESSION_FIXED_SUMS_H
 
@@ -22,7 +22,8 @@ static inline double sum_from_fixed_point(const int64_t sum[2])
     return ((double)sum[0] * (1 << FIXED_LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* Returns a value's position in the range, 0 at low and 1 at high. The computation does not overflow. */
+/* Returns a value's position in the range, 0 at low and 1 at high; 0 if the range has no width. The computation does
+ * not overflow. */
 static inline double position_in_range(double value, double low, double high)
 {
     return high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;

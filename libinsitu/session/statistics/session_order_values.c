@@ -1,7 +1,7 @@
 /* The value in a cell is the polynomial through the values at the cell's own nodes. For a field of the caller, these
- * are the caller's values, or a component or the magnitude of them. A derived field has values only at the vertices
- * that are read instead of the caller's nodes. If these vertices form finer lattices with n pieces between two nodes,
- * the values at every n-th point of a lattice are used, because these points are the cell's own nodes.
+ * are the caller's values, or a component or the magnitude of them. A derived field has values only at the vertices of
+ * the session's mesh (session_mesh.cells). If these vertices form finer lattices with n pieces between two nodes, the
+ * values at every n-th point of a lattice are used, because these points are the cell's own nodes.
  *
  * The functions of pyramids of an order above INTERPOLATION_MOST_PYRAMID are not implemented. Integrals over their
  * linear pieces are added up instead, and a mesh with such pyramids has no finer lattices. The value of a linear cell
@@ -173,7 +173,8 @@ static const double flat_share = 0x1p-40;
 
 typedef struct cell_integrals {
     double volume, size; /* integrals over the cell of the volume (or area) element, and of its absolute value */
-    /* integrals of v and of v^2, where v is the value's position in the range of values, minus 1/2 */
+    /* integrals of v and of v^2, where v is the value's position (0 to 1) in the range of the values at the cell's
+     * nodes, minus 1/2 */
     double first, second;
 } cell_integrals;
 
@@ -263,8 +264,8 @@ typedef struct cell_bins {
     const session_binned_volumes *binned;
     /* range of the values at the cell's nodes; scaled values are 0 at the minimum and 1 at the maximum */
     double minimum, maximum;
-    double total;
-    double volumes[SESSION_MAX_BINS];
+    double total;                     /* signed volume of the whole cell, including values outside of all bins */
+    double volumes[SESSION_MAX_BINS]; /* signed volume in each bin */
 } cell_bins;
 
 static void bin_volume(cell_bins *out, double value, double volume)

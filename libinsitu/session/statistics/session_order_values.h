@@ -1,5 +1,5 @@
-/* The values of the caller's cells in meshes with cells of higher order, as integrals of the cells' polynomials. They
- * do not depend on the linear pieces into which the cells are divided. */
+/* Computes the values of the caller's cells in meshes with cells of higher order, as integrals of the cells'
+ * polynomials. The results do not depend on the linear pieces into which the cells are divided. */
 #ifndef SESSION_ORDER_VALUES_H
 #define SESSION_ORDER_VALUES_H
 
@@ -35,8 +35,8 @@ typedef struct session_binned_volumes {
     int64_t *sums;     /* for each bin, a sum in fixed point (session_fixed_sums.h) */
 } session_binned_volumes;
 
-/* Adds the volumes of cells to out->sums, for cells in which the value varies (session_cell_value.is_integral). cells:
- * the values from session_find_order_values(). Parallel. Local. */
+/* Adds the volumes of cells to the bins in out->sums. Only cells in which the value varies are added
+ * (session_cell_value.is_integral). cells: the values from session_find_order_values(). Parallel. Local. */
 insitu_status session_bin_order_values(const session_order_field *of, const session_cell_value *cells,
                                        const session_binned_volumes *out, base_error *error);
 

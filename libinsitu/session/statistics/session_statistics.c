@@ -1,7 +1,7 @@
-/* Computes statistics with integer sums, which are the same for any order of summation (session_fixed_sums.h). A term
- * is the cell's volume as a fraction (0 to 1) of the volume of the largest cell, times 2^52. If there are shells and no
- * cell has a volume, areas are used instead of volumes. The error of a term is at most 2^-53 of the volume of the
- * largest cell.
+/* Computes statistics with integer sums, which are the same for any order of summation (session_fixed_sums.h). Before a
+ * cell's volume is added to a sum, it is divided by the volume of the largest cell; the result (0 to 1) is multiplied
+ * by 2^52 and rounded. The rounding error is therefore at most 2^-53 of the volume of the largest cell. If there are
+ * shells and no cell has a volume, areas are used instead of volumes.
  *
  * The values of the caller's cells of higher order are computed once, in the first pass (session_order_values.h). */
 #include "session_statistics.h"
@@ -21,15 +21,18 @@
 
 /* ---- sums ---------------------------------------------------------------------------------------------------- */
 
+/* Indices of the first pass's sums in their array. Entry 0 is the number of cells. The other sums have two words each:
+ * VOLUME: of volumes; MOMENT: of volumes times positions of the values in their range; BINS: of the volumes in each bin
+ * of the histogram. */
 enum { VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
-/* What a pass over the cells needs from earlier passes. */
+/* Results of earlier passes that a pass over the cells needs. */
 typedef struct sum_basis {
-    const session_statistics *first_pass;
-    double largest; /* volume of the largest cell */
+    const session_statistics *first_pass; /* the statistics that earlier passes have computed */
+    double largest;                       /* volume of the largest cell */
     /* mean of the values from the first pass, as a position in the range of values (0 to 1); used by the second pass */
     double approximate_mean;
-    bool is_second;
+    bool is_second;    /* set in the second pass, which adds up squared deviations from approximate_mean */
     bool is_of_shells; /* true: only shells are counted; false: only cells with a volume are counted */
 } sum_basis;
 
@@ -154,8 +157,8 @@ static session_cell_value **find_order_values(const statistics_work *w, int requ
     return &w->order_values[request * w->meshes->count + mesh];
 }
 
-/* Sets up a pass over the field of the request on a mesh of this rank. Returns false if the mesh does not have the
- * field. */
+/* Fills *pass with the input for a pass over the request's field on one of this rank's meshes. Returns false if the
+ * mesh does not have the field. */
 static bool set_up_pass(const statistics_work *w, int request, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
@@ -210,7 +213,8 @@ static insitu_status check_memory(const statistics_work *w, base_error *error)
     return session_agree(w->team->comm, error);
 }
 
-/* Returns whether only shells are counted, which is the case if there are shells and no cell has a volume. */
+/* Returns whether shells are counted for this request. This is the case if the field is on shells, but on no cell with
+ * a volume. */
 static bool is_of_shells(const statistics_work *w, int request)
 {
     const double *ends = w->extremes + KINDS * ENDS * request;

@@ -1,7 +1,8 @@
-/* Finds meshes in which the caller's order of vertices is not the one that vertex_order declares. The volumes at the
- * corners of a cell whose vertices are read in a wrong order have both signs, while in a correct or mirrored cell they
- * all have the same sign. (The sum of the volumes is not useful, because it may have any sign or be 0.) Therefore two
- * numbers are counted: the cells with both signs and, for each possible value of vertex_order, the cells that would
+/* Finds meshes in which the caller's order of vertices is not the one that vertex_order declares. The corner volume of
+ * a cell's corner is the signed volume that the edges at this corner span; for a quad it is an area. If vertices are
+ * read in a wrong order, the corner volumes of a cell have both signs, while in a correct or mirrored cell they all
+ * have the same sign. (Their sum is not useful, because it may have any sign or be 0.) Therefore two numbers are
+ * counted: the cells with both signs and, for each possible value of vertex_order, the cells whose corner volumes would
  * have a single sign if they were read in that order. */
 #include "session_vertex_order.h"
 
@@ -23,10 +24,12 @@ static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD
  * signs, and, for each possible vertex order, the cells whose corner volumes would all have the same sign. */
 enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
+/* Indices of the counts for one mesh: drawn cells that are not shells, those of them that have no volume, left-handed
+ * cells, shells, parts with cells of higher order, parts with bent cells, and then TYPE_SUMS counts for each type of
+ * cell. */
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, BENT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether the volumes at all corners of the cell would have the same sign if `order` were the mesh's
- * vertex_order. */
+/* Returns whether all corner volumes of the cell would have the same sign if `order` were the mesh's vertex_order. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_permutation(mesh->given.vertex_order, type);
@@ -87,7 +90,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int thread
     }
 }
 
-/* Returns whether most sampled cells of some type have corners of both signs. */
+/* Returns whether, for some type, most sampled cells have corner volumes of both signs. */
 static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
 {
     bool is_any = false;
@@ -96,8 +99,8 @@ static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
     return is_any;
 }
 
-/* Returns the order with which most sampled cells have a single sign. Returns -1 if there is no order with which, in
- * each type, at least half of the cells have a single sign. */
+/* Returns the order with which the corner volumes of most sampled cells have a single sign. Returns -1 if there is no
+ * order with which this holds for at least half of the sampled cells of each type. */
 static int find_fitting_order(const int64_t sums[CELL_SUMS])
 {
     int best = -1;
@@ -116,8 +119,8 @@ static int find_fitting_order(const int64_t sums[CELL_SUMS])
     return best;
 }
 
-/* Warns if most cells of a type have corners of both signs, and names the order that fits most cells, if there is one.
- * Returns whether it has warned. */
+/* Warns if, for some type, most sampled cells have corner volumes of both signs, and names the order that fits most
+ * cells, if there is one. Returns whether this is the case for some type. */
 static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};

@@ -1,4 +1,4 @@
-/* Computes the volume of a cell, with the shape of faces that is drawn, or the area of a shell. */
+/* Computes the volume of a cell, or the area of a shell. The cell's faces have the same shapes as in pictures. */
 #ifndef SESSION_VOLUME_H
 #define SESSION_VOLUME_H
 
