@@ -13,6 +13,7 @@
 #include "scene_expression.h"
 
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
+/* Whether each cell is drawn with its own cell or corner values, or with their means at vertices. */
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
 /* The scalar that is computed from a field: its magnitude, or its component n. SCENE_COMPONENT_DEFAULT is component 0
@@ -24,12 +25,12 @@ enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_
 typedef struct scene_field {
     char *name;
     int component; /* index of the component, or one of the constants SCENE_COMPONENT_* */
-    /* set if cell values are averaged to the vertices; otherwise they are drawn as constants per cell */
+    /* set if cell values are averaged to the vertices; otherwise each cell is drawn with its constant value */
     bool at_vertices;
     /* For a field with a value at each corner of each cell: set if the values of all corners at a vertex are replaced
      * by their mean. Otherwise cells may have different values at a common vertex. */
     bool joins_corners;
-    bool is_as_given; /* set if hanging vertices keep the values that the caller gave */
+    bool is_as_given; /* set if hanging vertices keep the caller's values instead of interpolated ones */
     int line;         /* line in the scene file, for messages about the field */
     int mesh_count;   /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
     char **meshes;    /* names of meshes; the name "a" also selects meshes whose names begin with "a/" */
@@ -39,8 +40,8 @@ typedef struct scene_field {
     uint64_t mesh_group_name;
 } scene_field;
 
-/* Returns whether the layer's list of meshes includes the mesh of this name. The mesh may nevertheless lack the
- * field. */
+/* Returns whether the field's list of meshes (scene_field.meshes) selects the mesh of this name. The mesh may
+ * nevertheless lack the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
 /* Returns whether a name in a scene selects the mesh. It does so if it is the mesh's whole name, or the part of the
  * mesh's name before a slash. */
@@ -112,11 +113,11 @@ typedef struct scene_colour_map {
     float *colours;
     bool is_banded; /* set if each colour belongs to a band and colours are not interpolated; bands have equal widths */
     scene_scale scale;
-    double threshold; /* SCENE_SYMLOG is linear from -threshold to threshold; > 0 */
-    bool has_below, has_above;
+    double threshold;          /* SCENE_SYMLOG is linear from -threshold to threshold; > 0 */
+    bool has_below, has_above; /* set if the scene gives a colour for values below, or above, the range */
     /* colours of values below the range, of values above it (by default the colours of the map's ends), and of NaN */
     float outside_colours[3][3];
-    bool has_nan;
+    bool has_nan; /* set if the scene gives a colour for NaN */
     scene_range range;
 } scene_colour_map;
 
@@ -170,6 +171,8 @@ typedef struct scene_lines {
 /* Returns the default width of contour lines, in pixels, in a picture of this height. */
 float scene_default_line_width(int height);
 
+/* How an isosurface's normals are computed: from the gradient in the crossed cell, from central differences between
+ * samples of the field, or by interpolation between gradients at the cell's vertices. */
 typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } scene_normal;
 
 typedef struct scene_isosurface {
@@ -214,9 +217,9 @@ typedef struct scene_surface {
     scene_field meshes_field;
     /* set if the session has added the layer for meshes that consist only of shells; a scene file cannot set it */
     bool is_of_shells;
-    float colour[3];  /* colour of the edges, linear RGB */
-    float edge_width; /* width of the edges in pixels; 0: no edges are drawn */
-    float edge_colour[3];
+    float colour[3];      /* colour of the surface, linear RGB, unless a field colours it (has_colour_by) */
+    float edge_width;     /* width of the edges in pixels; 0: no edges are drawn */
+    float edge_colour[3]; /* colour of the edges, linear RGB */
     scene_threshold threshold;
     bool has_colour_by;
     scene_field colour_by;
@@ -256,9 +259,9 @@ enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
-    scene_plane plane; /* bounding plane of a half space; its normal points to the side that is cut away */
-    double lower[3], upper[3];
-    double centre[3], radius; /* centre and radius (> 0) of a sphere */
+    scene_plane plane;         /* bounding plane of a half space; its normal points to the side that is cut away */
+    double lower[3], upper[3]; /* lower and upper corner of a box */
+    double centre[3], radius;  /* centre and radius (> 0) of a sphere */
 } scene_clip;
 
 typedef struct scene_slice {
@@ -275,8 +278,8 @@ typedef struct scene_slice {
 
 typedef struct scene_light {
     double direction[3]; /* unit vector towards the light; in camera axes (right, up, backward) unless is_in_world */
-    bool is_in_world;
-    float colour[3]; /* linear RGB, multiplied by the light's intensity */
+    bool is_in_world;    /* set if the direction is in the axes of the scene */
+    float colour[3];     /* linear RGB, multiplied by the light's intensity */
 } scene_light;
 
 /* Maximum number of circles of an orbit. */
@@ -315,7 +318,7 @@ typedef struct scene_camera {
     double up[3];
     double angle; /* vertical angle of view in degrees; 40 by default */
     double zoom;  /* automatic camera: 1 fits the bounds into the picture; larger values are closer */
-    /* automatic camera: set if the box of the bounds must fill the frame; otherwise the sphere around the box */
+    /* automatic camera: true: the box of the bounds is fitted into the frame; false: the sphere around this box */
     bool fits_box;
     bool is_orthographic;
     /* orthographic camera: height of the visible region in scene units; 0: the height that a perspective camera would
@@ -560,7 +563,7 @@ typedef struct scene_field_walk {
 
 /* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
 scene_field *scene_next_field(scene_field_walk *walk);
-/* Returns the word for a kind of layer, for messages. */
+/* Returns the word for a kind of layer, such as "isosurface", for messages. */
 const char *scene_get_layer_word(scene_layer_kind kind);
 
 /* Returns whether the image is the first variant; results that all variants share are stored with it. */
@@ -581,7 +584,7 @@ static inline bool scene_draws_text(const scene_image *image)
 }
 
 /* The cells over which trees are built: SCENE_TREE_FULL: all cells; SCENE_TREE_PARTIAL: only cells that images can
- * show; SCENE_TREE_AUTO: whichever of these costs less. */
+ * show; SCENE_TREE_AUTO: whichever of these two is estimated to cost less time. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */

@@ -1,5 +1,5 @@
 /* Reads the clips of an image's layers: half spaces, boxes and spheres. An image has one list of clips, without
- * duplicates; each layer has a set of entries of this list. */
+ * duplicates; each layer has a set of entries of this list, stored as a bit mask. */
 #include <stdio.h>
 #include <string.h>
 

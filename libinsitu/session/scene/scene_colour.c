@@ -1,6 +1,6 @@
-/* Reads the keys that describe how values are mapped to colours. All kinds of layers use the same keys. A colour map is
- * stored as a table. If the scene requests it, the table is reversed and divided into bands here, so that other code
- * need not distinguish built-in maps, files and lists of colours. */
+/* Reads the keys that describe how values are mapped to colours. All kinds of layers use the same keys. Every colour
+ * map is stored as a table of colours, so that other code need not distinguish built-in maps, files and lists of
+ * colours. If the scene requests it, the table is reversed and divided into bands here. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -123,7 +123,8 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Reads a file as an attachment of the scene. Takes ownership of the path. */
+/* Reads a file, and adds it to the scene's attachments. After a success the attachments own the path; after an error
+ * the caller still owns it. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;

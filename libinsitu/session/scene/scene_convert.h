@@ -22,8 +22,8 @@ bool scene_normalize(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* Number of fields, of isovalues, of planes and of views of which an image makes pictures. Their product is the number
- * of pictures that the image makes in a step. */
+/* Numbers of fields, isovalues, planes and views for which an image makes pictures. An image makes one picture for each
+ * combination, so that the product is the number of its pictures in a step. */
 typedef struct scene_series {
     int fields, isovalues, planes, views; /* each is at least 1 */
 } scene_series;
@@ -46,7 +46,7 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
                                  scene_camera *out);
 int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
-/* Sets the direction of a camera with an orbit to that of the view with this index. */
+/* Sets the direction of a camera with an orbit to the direction of the view with this index. */
 void scene_set_orbit_view(scene_camera *camera, int view);
 
 /* Converts the path of an output that belongs to a database. */
@@ -88,8 +88,8 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
-/* Copies the texts of the list at the path into a new array of the same length. The caller must free the array even
- * after an error. If path is NULL, the array is empty. */
+/* Copies the texts of the node at the path (a text or a list of texts) into a new array. The caller must free the array
+ * and the texts, even after an error. If path is NULL, the array is empty. */
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
 /* Converts the list of mesh names of a layer. layer: path of the layer in the file. */
@@ -116,11 +116,12 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
 /* Converts a material. If in is NULL, the result is the default material. It is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips at the path to the image's list, and sets their bits in the set. Bit i stands for entry i of the list.
- * in: NULL if there are no clips. */
+/* Adds the clips at the path to the image's list (scene_image.clips), and sets their bits in *set. Bit i stands for
+ * entry i of the list. in: NULL if there are no clips. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Computes the set of clips that cut a layer: the clips of all layers and the layer's own clips. */
+/* Computes the set of clips that cut a layer: the image's clips, which cut all layers, and the clips that the file
+ * gives for this layer. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
 /* Converts the plane with this index in the list `planes` of the mapping at the path. */

@@ -141,7 +141,7 @@ void scene_document_close(scene_document *d)
     }
 }
 
-/* ---- nodes ---- */
+/* ---- nodes and paths ---- */
 
 static yaml_node_t *find_node_by_index(const scene_document *d, int index)
 {
@@ -624,7 +624,7 @@ static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *n
     }
 }
 
-/* Checks the node against the first form of the value that accepts the node's type. */
+/* Checks the node against the first form of the value that allows the node's type (scalar, list or mapping). */
 static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -637,8 +637,8 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return fail_for_value(d, path, node, value, key);
 }
 
-/* Returns whether a name that the scene defines is allowed. Such names are part of paths in messages, and arguments of
- * calls by simulations. */
+/* Returns whether a name that the scene defines is allowed. Such names occur in paths in messages, and simulations pass
+ * them to functions of the library. */
 static bool is_valid_scene_name(const yaml_node_t *name)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";

@@ -1,5 +1,5 @@
-/* Represents a scene file as a tree of YAML nodes with their lines. The functions find errors, compose messages about
- * them, and store correct values in the schema's structs. */
+/* Represents a scene file as a tree of YAML nodes with their lines. The functions check the tree against the schema,
+ * compose messages about errors, and store correct values in the schema's structs. */
 #ifndef SCENE_SCENE_DOCUMENT_H
 #define SCENE_SCENE_DOCUMENT_H
 
@@ -38,11 +38,12 @@ insitu_status scene_document_read(scene_document *d, scene_file **file);
  * list whose entries have the key `name`, a short name without . and [ may replace the index, as in "fields.speed". */
 int scene_document_line(const scene_document *d, const char *path);
 
+/* Returns whether a path may contain this name instead of an index: the name is short and contains no . and no [. */
 bool scene_is_plain_name(const char *name);
 
-/* Stores pointers to the texts of the node at a path, at most `most` of them. The node must be a text or a list of
- * texts; the document owns the texts. Returns how many texts the node has, even if this is more than `most`; 0 if there
- * is no node at the path. */
+/* Stores pointers to the texts of the node at a path in `texts`, at most `most` of them. The node must be a text or a
+ * list of texts; the document owns the texts. Returns how many texts the node has, even if this is more than `most`; 0
+ * if there is no node at the path. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
 /* Stores pointers to the keys of the mapping at a path, at most `most` of them. The keys must be names that the scene

@@ -94,7 +94,7 @@ static bool accept_character(parser *p, char c)
     return true;
 }
 
-/* Returns the length of the next name, number or sign, for a message. */
+/* Returns the length of the name, number or sign at the start of the text, for a message; 0 at the end of the text. */
 static int word_length(const char *at)
 {
     int length = 0;

@@ -1,15 +1,15 @@
 /* Defines expressions of fields, such as "sqrt(u.x^2 + u.y^2) / a". A text is compiled into a program for a stack
- * machine. The machine evaluates the program for a block of points at a time. */
+ * machine. The program is run for a block of points at a time. */
 #ifndef SCENE_SCENE_EXPRESSION_H
 #define SCENE_SCENE_EXPRESSION_H
 
 #include <stdbool.h>
 
 enum {
-    SCENE_EXPRESSION_BYTES = 1000,
-    SCENE_BLOCK = 256, /* maximum number of points for which a program is run at once */
-    SCENE_STACK = 32,  /* maximum number of stack entries of a program */
-    SCENE_FAULT_SIZE = 400
+    SCENE_EXPRESSION_BYTES = 1000, /* maximum length of an expression's text */
+    SCENE_BLOCK = 256,             /* maximum number of points for which a program is run at once */
+    SCENE_STACK = 32,              /* maximum number of stack entries of a program */
+    SCENE_FAULT_SIZE = 400         /* size of the buffer for the description of a fault */
 };
 
 /* An operation of a program: a function of one or two numbers, an operator, or an instruction that pushes a number. */
@@ -41,7 +41,7 @@ typedef struct scene_instruction {
     double number; /* operand of SCENE_OP_PUSH_NUMBER, and exponent of SCENE_OP_WHOLE_POWER */
 } scene_instruction;
 
-/* A scalar of a field: the field's name, and a component as in scene_field.component. */
+/* A scalar that an expression reads: the name of a field, and its component as in scene_field.component. */
 typedef struct scene_reference {
     char *name;
     int component;

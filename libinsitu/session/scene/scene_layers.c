@@ -147,7 +147,8 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     return INSITU_OK;
 }
 
-/* Checks the counts of a whole image before any layer is converted. */
+/* Counts the layers of an image, and checks that they do not exceed their maximum numbers, before any layer is
+ * converted. */
 static insitu_status count_layers(const scene_document *d, const char *path, const scene_file_image *in,
                                   layer_counts *counts)
 {

@@ -130,8 +130,8 @@ char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
     return text;
 }
 
-/* Placeholders such as {view} need a key of the image. Returns a description of this key if the image lacks it;
- * otherwise NULL. image: path of the image in the file. */
+/* Placeholders such as {view} may be used only if the image has a certain key, such as camera.orbit. Returns a
+ * description of this key if the image lacks it; otherwise NULL. image: path of the image in the file. */
 static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {

@@ -1,5 +1,5 @@
-/* Defines the scene file's schema: the structs into which the file is read, and the values and the meaning of each key.
- * The schema uses the types and macros of libcyaml's header, but no function of that library is called.
+/* Defines the scene file's schema: the structs into which the file is read, and for each key the values that it accepts
+ * and its meaning. The schema uses the types and macros of libcyaml's header, but calls no function of that library.
  *
  * Every optional value is a pointer, which is NULL if the file does not give the value; scene.c fills in the
  * defaults. */
@@ -308,8 +308,8 @@ typedef struct scene_key {
     const char *help;
     const char *default_text; /* default value, as shown in docs/scene.md; NULL: the key is required */
     double low, high; /* range of a number, or of each number of a list; any finite number is allowed if both are 0 */
-    bool is_low_excluded;
-    bool is_high_excluded;
+    bool is_low_excluded;  /* set if a number must be greater than `low`; otherwise it may be equal to it */
+    bool is_high_excluded; /* set if a number must be less than `high`; otherwise it may be equal to it */
     bool is_named; /* for a list: set if paths contain the name of an entry (its key `name`) instead of its index */
     const struct scene_mapping *child; /* keys of the mapping, or of each mapping in the list */
     /* forms of the value, one for each type that it may have; NULL: there is a single type */
@@ -333,10 +333,10 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* Limits of names. libcyaml has no type for three kinds of values: a name or a list of names, a value of several forms,
- * and a mapping whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the
- * document (scene_document_texts(), scene_document_kind(), scene_document_names()). Keys that the scene defines have at
- * most SCENE_KEY_BYTES bytes. */
+/* Limits of names: number of bytes of a name, number of names in a list or mapping, and number of bytes of a key that
+ * the scene defines. libcyaml has no type for three kinds of values: a name or a list of names, a value of several
+ * forms, and a mapping whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the
+ * document (scene_document_texts(), scene_document_kind(), scene_document_names()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
 /* scene_top: the top-level mapping of a file, which is read into a scene_file; scene_top_value: the same mapping as a

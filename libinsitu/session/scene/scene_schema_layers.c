@@ -88,8 +88,8 @@ static const scene_form range_forms[] = {
     {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, range_words, CYAML_ARRAY_LEN(range_words))}, {0}},
     {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, range_fields)}, {.child = &range_mapping}}};
 
-/* The keys that describe how values are mapped to colours, for a mapping with a member `colours` of type
- * scene_file_colour_map. */
+/* Declares the keys that describe how values are mapped to colours. type: struct into which the keys are read; it must
+ * have a member `colours` of type scene_file_colour_map. */
 #define COLOUR_MAP_KEYS(X, type)                                                                                       \
     X(FORMS("map"), .help = "Colour map: a built-in one, a list of colours, or one from a file.",                      \
       .default_text = "`viridis`", TAKES(map_forms))                                                                   \
@@ -175,7 +175,7 @@ DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
       .default_text = "`inside`")
 EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
-/* Declares the key `clip` of a layer of this type. */
+/* Declares the key `clip` of a layer. type: struct of the layer; more: text that is added to the help. */
 #define CLIP_KEY(X, type, more)                                                                                        \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, type, clip, scene_clip_fields),                                        \
       .help = "Cuts away parts of this layer, in addition to what the image's `clip` cuts from all layers." more,      \
@@ -230,7 +230,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .default_text = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
 DEFINE_MAPPING(lines, "lines", LINES_KEYS);
 
-/* Declares the key `lines` of a layer of this type. */
+/* Declares the key `lines` of a layer. type: struct of the layer. */
 #define LINES_KEY(X, type)                                                                                             \
     X(CYAML_FIELD_MAPPING_PTR("lines", OPTIONAL, type, lines, lines_fields),                                           \
       .help = "Contour lines, at places of the surface where a field has given values.", .default_text = "none",       \

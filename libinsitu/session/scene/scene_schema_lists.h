@@ -1,6 +1,6 @@
-/* Defines macros for the lists of keys in the schema's files. Each mapping has one list, in which each key is given
- * both as a field of libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md
- * are all derived from these lists, so that they always agree. */
+/* Defines macros for the lists of keys in the schema's files. Each mapping of the scene file has one list of its keys.
+ * An entry of the list describes a key both as a field of libcyaml's schema and as a scene_key. The reader, the checks,
+ * the error messages and docs/scene.md are all derived from these lists, so that they always agree. */
 #ifndef SCENE_SCHEMA_LISTS_H
 #define SCENE_SCHEMA_LISTS_H
 

@@ -146,7 +146,7 @@ static void expand_axis(rewrite *r, int *value)
     if (text && read_axis(text, axis)) *value = make_vector(r, axis);
 }
 
-/* ---- other forms ------------------------------------------------------------------------------------------------ */
+/* ---- texts, lists, switches and names --------------------------------------------------------------------------- */
 
 /* Expands a text to a mapping in which the text is the value of the key. */
 static void expand_text(rewrite *r, const char *key, int *value)
@@ -508,7 +508,8 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"frequency", "every"},
                                           {"interval", "every"}};
 
-/* Returns the first candidate that corresponds to the given word of another program, or NULL if there is none. */
+/* Returns the first candidate that `synonyms` lists as the schema's word for the given word, or NULL if there is
+ * none. */
 static const char *find_synonym(const char *word, const char *const *candidates, int count)
 {
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)

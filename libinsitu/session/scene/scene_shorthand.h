@@ -15,9 +15,10 @@ bool scene_expand_shorthand(yaml_document_t *document);
  * none. */
 const char *scene_describe_short_form(const char *key, size_t length);
 
-/* Returns the candidate that was probably meant by the word. This is the schema's equivalent of a word of other
- * programs, or the candidate with the fewest edits (insertion, removal or replacement of a letter, exchange of two
- * neighbouring letters), if at most a third of the letters differ. Returns NULL if there is none. */
+/* Returns the candidate that the author of a scene probably meant by an unknown word. If other programs use the word,
+ * this is the corresponding word of the schema. Otherwise it is the candidate that is reached with the fewest edits
+ * (insertion, removal or replacement of a letter, exchange of two neighbouring letters), if their number is at most a
+ * third of the word's length. Returns NULL if there is no such candidate. */
 const char *scene_nearest_word(const char *word, const char *const *candidates, int count);
 
 #endif

@@ -1,4 +1,4 @@
-/* Reads statistics of fields: those that are written to files, and those in conditions of images. */
+/* Reads the requests for statistics of fields: statistics that are written to files, and conditions of images. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Reads the outer surfaces of meshes, and the fields that colour them. */
+/* Reads the surface layers of an image: their edges, thresholds, colours and contour lines. */
 #include <math.h>
 #include <stdio.h>
 

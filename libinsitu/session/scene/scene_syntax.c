@@ -40,7 +40,7 @@ static text_line make_line(const char *start, const char *end, size_t number)
     return l;
 }
 
-/* Returns the next line; after the last line, an empty one. */
+/* Returns the line after this one; if this is the last line, returns an empty line. */
 static text_line find_next_line(text_line l, const char *end)
 {
     const char *stop = memchr(l.start, '\n', (size_t)(end - l.start));
@@ -59,8 +59,8 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Stores the message and the line of the error. Always returns true, so that a rule can return the result of this call
- * when it has found an error. */
+/* Stores the message and the line of the error. line: index of the line, from 0. Always returns true, so that a rule
+ * can return the result of this call when it has found an error. */
 __attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -147,8 +147,8 @@ static size_t word_length(const char *at, const char *end)
     return (size_t)(p - at);
 }
 
-/* Returns the length of a text whose first word has the length `word`. The text ends after the word if a comma, a # or
- * another key follows on the line, and otherwise at the end of the line. */
+/* Returns the length of the unquoted text that begins at `at`, whose first word has the length `word`. The text ends
+ * after this word if a comma, a # or another key follows on the line, and otherwise at the end of the line. */
 static size_t measure_unquoted_text(const char *at, size_t word, const char *end)
 {
     while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;

@@ -1,5 +1,5 @@
-/* Describes the error in a text that is not YAML for the text's author: names the faulty line, and the text that the
- * line should contain. */
+/* Describes why a text is not valid YAML, in words that help the author of the text: names the faulty line, and the
+ * text that the line should contain. */
 #ifndef SCENE_SCENE_SYNTAX_H
 #define SCENE_SCENE_SYNTAX_H
 
@@ -9,7 +9,7 @@
 
 enum { SCENE_SYNTAX_SIZE = 300 };
 
-/* Describes the error that a parser found in the text, and sets *line, counted from 1. */
+/* Describes the error that a parser found in the text. *line receives the line of the mistake, counted from 1. */
 void scene_describe_syntax_error(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
                                  char words[SCENE_SYNTAX_SIZE]);
 

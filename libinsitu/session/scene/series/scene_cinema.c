@@ -1,4 +1,4 @@
-/* Reads outputs that belong to Cinema databases. */
+/* Reads outputs that belong to Cinema databases: folders of pictures, each with a table that describes the pictures. */
 #include <stdio.h>
 #include <string.h>
 

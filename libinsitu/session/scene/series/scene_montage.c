@@ -1,5 +1,5 @@
-/* Finds which pictures are panels of one file, and which are insets over them. Panels are numbered in the order in
- * which pictures are drawn: images in the order of the scene, for each image the entries of its sweep, and for each
+/* Finds which pictures are panels of one file, and which are insets over these panels. Panels are numbered in the order
+ * in which pictures are drawn: images in the order of the scene, for each image the entries of its sweep, and for each
  * entry the views of its orbit. Insets are drawn after the panels, so that no panel covers an inset. */
 #include <math.h>
 #include <stdio.h>

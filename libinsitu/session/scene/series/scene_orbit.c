@@ -63,7 +63,7 @@ static void convert_elevations(const scene_document *d, const char *path, scene_
     }
 }
 
-/* Rejects the keys that an orbit replaces. */
+/* Returns an error if the camera has keys that its orbit replaces. */
 static insitu_status refuse_replaced_keys(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";

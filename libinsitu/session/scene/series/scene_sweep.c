@@ -117,8 +117,8 @@ static bool replace_field(scene_field *field, const char *name, int line)
     return true;
 }
 
-/* Replaces the field that colours a layer. If the layer's contour lines show the field that colours it, they show the
- * new field too. */
+/* Replaces the field that colours a layer. If the layer's contour lines are those of the field that colours it, they
+ * become contour lines of the new field. */
 static bool replace_colours(scene_field *field, scene_lines *lines, const char *name, int line)
 {
     return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
