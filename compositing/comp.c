@@ -3,7 +3,8 @@
  * and which rank owns which block; after the phases, they agree whether all ranks succeeded. A rank that runs out of
  * memory during a phase takes part in the remaining communication, so that no rank waits for it, and reports the error
  * at the end. Memory is released as soon as its phase ends: at the peak, a rank holds its own fragments and the packed
- * fragments received from other ranks. A single rank merges its list in place, or has no list (comp_tiles.h). */
+ * fragments received from other ranks. A single rank merges its list of fragments in place. It has no list if its
+ * pixels have already been blended tile by tile (comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -152,7 +153,8 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     return status;
 }
 
-/* Begins compositing. If this fails, the fragments are freed. */
+/* Checks the picture's size, and initializes the route, the grid and the claims to blocks. On an error the fragments
+ * are freed. */
 static insitu_status begin_composite(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;

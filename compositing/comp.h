@@ -1,6 +1,6 @@
 /* Compositing: combines the fragments of many ranks into one picture on rank 0. A fragment is what one rank contributes
- * to a pixel: a surface hit, or a volume between two depths (fragment.h). This module has no access to cells, trees or
- * the scene.
+ * to a pixel: a surface hit, or a volume between two points of the ray (fragment.h). This module has no access to
+ * cells, trees or the scene.
  *
  * Blocks of pixels are owned by ranks that have many fragments there (comp_grid.h). Every rank sends each owner its
  * fragments (on the routes of comp_route.h), owners sort them by t and blend front to back, and rank 0 gathers the
@@ -53,14 +53,14 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
 
 /* Returns whether a pixel's fragments, in the order of comp_merge_pixel(), overlap in front of the first opaque
  * fragment. Two volume fragments overlap if both contain some t. A volume fragment overlaps a surface if it contains
- * the surface's t, unless the volume fragment begins at that t, within the rounding error of a face's depth. A fragment
- * whose end precedes its start, because its length is below rounding, overlaps nothing. Single samples (fragment.h) of
- * two volumes, or of two cells at their common face, do not overlap. Local. */
+ * the surface's t. It does not overlap the surface if it begins at that t, except for the rounding error of the t at
+ * which a ray crosses a face. A fragment whose end precedes its start, because its length is below rounding, overlaps
+ * nothing. Single samples (fragment.h) of two volumes, or of two cells at their common face, do not overlap. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 /* Returns whether a pixel's fragments overlap (comp_pixel_overlaps()), for fragments that ranks may have folded. They
- * must be in the order of comp_merge_folded_pixel(). Fragments behind the depth at which comp_merge_folded_pixel()
- * stops, because almost no light is left, are ignored. Local. */
+ * must be in the order of comp_merge_folded_pixel(). comp_merge_folded_pixel() stops where almost no light is left;
+ * fragments behind this point of the ray are ignored. Local. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {

@@ -8,8 +8,9 @@ const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11}
  * All pixels of a tile, or of a block if blocks are smaller than tiles, have the same owner. */
 enum { TILE_PIXELS = 256 };
 
-/* Returns the number of partners to which the busiest rank sends messages in a round: all partners in a dense round,
- * and in a sparse round at most one per tile (or block, if it is smaller) in which the rank has fragments. */
+/* Returns the number of partners to which the busiest rank sends messages in a round. In a dense round these are all
+ * partners. In a sparse round there are at most as many as tiles (or blocks, if these are smaller) in which the rank
+ * has fragments. */
 static double count_partners(const comp_route *route, int round, const comp_load *load)
 {
     const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;

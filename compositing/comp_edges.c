@@ -10,9 +10,9 @@
  * processing. */
 enum { ROWS = 32 };
 
-/* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. An sRGB code is nearly
- * proportional to the square root of linear light. The test |sqrt(a) - sqrt(b)| > c is replaced by (a - b)^2 > 2 c^2 (a
- * + b) to avoid square roots. */
+/* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs by more than the limit
+ * of comp_find_edges(). An sRGB code is nearly proportional to the square root of linear light. The test |sqrt(a) -
+ * sqrt(b)| > c is replaced by (a - b)^2 > 2 c^2 (a + b) to avoid square roots. */
 static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;

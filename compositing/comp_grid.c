@@ -76,8 +76,8 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
-/* Stores in loads[] the number of fragments that each rank owns. Returns the mean over the ranks that own blocks,
- * rounded up. */
+/* Stores in loads[] the number of fragments that each rank owns. Returns the mean number of fragments of the ranks that
+ * own blocks, rounded up. */
 static uint64_t compute_equal_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;

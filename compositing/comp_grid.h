@@ -10,7 +10,8 @@ enum {
     COMP_LANES = 16,
     COMP_ROWS = 32, /* maximum number of rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
-    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks; it keeps the message with all claims small */
+    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks, chosen so that a message with the claims to all blocks is
+                                     small */
     COMP_BLOCKS_PER_RANK = 60,    /* minimum mean number of blocks per rank */
     COMP_COUNTED_RANKS_MAX = 1024 /* maximum number of ranks to which the number of blocks is adapted */
 };
@@ -122,10 +123,10 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 }
 
 /* Balances the number of fragments per owner: moves blocks from ranks with more than the mean to other owners, until no
- * rank exceeds the mean by more than the number of fragments in the fullest block. The claims must be the combined
- * claims of all ranks; they are the same on all ranks before and after. loads has one entry per rank and receives the
- * number of fragments that the rank owns. A rank without blocks does not receive any: if one rank has nearly all
- * fragments, it keeps them, so that most of them need not be sent. */
+ * rank exceeds the mean by more than the number of fragments in the block with most fragments. The claims must be the
+ * combined claims of all ranks, which are the same on every rank; so are the changed claims. loads has one entry per
+ * rank and receives the number of fragments that the rank owns. A rank without blocks does not receive any: if one rank
+ * has nearly all fragments, it keeps them, so that most of them need not be sent. */
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
 
 #endif

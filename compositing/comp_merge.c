@@ -1,9 +1,9 @@
 /* Defines how fragments are merged: how one pixel's fragments, from any ranks and in any order, become one colour.
  *
  * The order is total, down to the last bit of a fragment: fragments that compare equal are identical. The rounding of
- * blending depends on the order. Because the order is total, the result depends only on the set of fragments. If depths
- * differ, only depth determines the order; if a surface and a volume begin at the same depth, the surface is in front,
- * because it is the nearer end of an interval.
+ * blending depends on the order. Because the order is total, the result depends only on the set of fragments. Of two
+ * fragments, the one with the smaller t_in is in front. If a surface and a volume have the same t_in, the surface is in
+ * front, because it lies at the near end of the volume's interval.
  *
  * Samples at the same position have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, which
  * is less than the sum of their separate absorptions. Each sample contributes in proportion to its own absorption. This
@@ -119,14 +119,13 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
     return false;
 }
 
-/* Relative tolerance between the depths that two cells compute for their common face; it is relative to the depth or to
- * 1, whichever is larger. The value is RENDER_FACE_ERROR of render/rays/render_face_error.h; compositing may not
- * include that header. */
+/* Tolerance between the values of t that two cells compute for a ray's crossing of their common face. It is relative to
+ * t or to 1, whichever is larger. The value is RENDER_FACE_ERROR of render/rays/render_face_error.h; compositing may
+ * not include that header. */
 static const float face_error = 4e-6f;
 
-/* Advances *next behind all fragments that begin in front of the depth t by more than the rounding error of a face's
- * depth. Returns the depth at which the volume fragments in front of the new *next end: the largest of their t_out, or
- * `reach` if it is larger. */
+/* Advances *next past all fragments that begin before t by more than the rounding error of a face's t. Returns the
+ * largest t_out of the volume fragments that were passed, or `reach` if it is larger. */
 static float find_furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -189,8 +188,8 @@ static bool is_volume_of_positive_length(const fragment *f)
 /* Finite value that is used as the optical depth of an opaque medium; the true value is infinite. */
 static const double opaque_depth = 1e6;
 
-/* Blends a homogeneous mixture of media behind what *b contains. The mixture reaches from depth `from` to depth `to`;
- * each of its media is the volume fragment of an interval that spans these depths. */
+/* Blends a homogeneous mixture of media behind what *b contains. The mixture reaches from t = `from` to t = `to`. Each
+ * of its media is a volume fragment whose interval contains both of these points. */
 static void blend_mixture(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
@@ -217,7 +216,7 @@ static void swap_fragments(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves the intervals that end behind `depth` to the front of the list, without changing their order. Returns the
+/* Moves the intervals that end behind t = `depth` to the front of the list, without changing their order. Returns the
  * number of these intervals. */
 static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
 {
@@ -258,7 +257,7 @@ static void emit_interval(const interval_sink *sink, const blend *b, const fragm
     sink->callback(sink->state, &interval);
 }
 
-/* Blends the mixture of the given volume fragments between the depths `from` and `to` behind what *b contains
+/* Blends the mixture of the given volume fragments between t = `from` and t = `to` behind what *b contains
  * (blend_mixture()), and passes the mixture to the sink's callback. */
 static void blend_interval(blend *b, const fragment *items, int64_t count, float from, float to,
                            const interval_sink *sink)
@@ -271,10 +270,11 @@ static void blend_interval(blend *b, const fragment *items, int64_t count, float
     blend_mixture(b, items, count, from, to);
 }
 
-/* Blends fragments from the first one on until no interval is open; returns their number. An interval is open at a
- * depth if it begins there or in front, and ends behind. Open intervals are kept at the front of the list, so that the
- * cost between two cuts depends only on the number of intervals mixed there: a long interval beside a thousand
- * consecutive short ones costs a thousand mixtures of two. At the end the fragments are in their original order. */
+/* Blends fragments from the first one on until no interval is open; returns the number of blended fragments. An
+ * interval is open at a point of the ray if it begins at or before this point and ends behind it. Open intervals are
+ * kept at the front of the list, so that the cost between two cuts depends only on the number of intervals mixed there:
+ * a long interval beside a thousand consecutive short ones costs a thousand mixtures of two. At the end the fragments
+ * are in their original order. */
 static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, const interval_sink *sink)
 {
     float at = sorted[0].t_in;
@@ -345,7 +345,7 @@ static int64_t count_fragments_to_fold(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Returns whether `next` is invisible behind the fragments blended so far; `before` is the last blended fragment. If
+/* Returns whether the fragments blended so far hide the fragment `next`; `before` is the last blended fragment. If
  * `next` is in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may
  * have omitted fragments of later intervals (fragment_fold.h). */
 static bool is_hidden_behind(float transmittance, const fragment *before, const fragment *next)
@@ -409,8 +409,8 @@ void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_int
     }
 }
 
-/* Fragments behind the depth at which blending stops are not tested for overlaps. Their number depends on the
- * partition, because ranks may omit them. */
+/* Fragments behind the point of the ray at which blending stops are not tested for overlaps. Ranks may omit such
+ * fragments, so that their number depends on the partition. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

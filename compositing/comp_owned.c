@@ -3,8 +3,8 @@
  * sheet (comp_sheet.h), 16 pixels at a time, and blended there. Pixels in which several fragments must be blended are
  * called mixed: their fragments are listed and merged by comp_merge_pixel().
  *
- * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because they
- * are invisible. */
+ * Fragments behind an opaque surface are invisible. They are dropped, even if volumes in front of the surface arrive
+ * later. */
 #include "comp_owned.h"
 
 #include <string.h>
@@ -21,8 +21,9 @@ typedef struct merge_scratch {
     /* remaining: the fragments of mixed pixels except the one in `joined`; listed: all fragments of mixed pixels. Their
      * .pixel is the index in the strip. */
     fragment_list remaining, listed;
-    uint16_t mixed[COMP_ROWS]; /* bit mask per row: the mixed pixels */
-    /* counts: number of fragments of each mixed pixel; ends: the index in `listed` at which they end */
+    uint16_t mixed[COMP_ROWS]; /* for each row of the strip, the bit mask of its mixed pixels; bit i is column i */
+    /* counts: for each mixed pixel, the number of its fragments. ends: for each mixed pixel, the index in `listed`
+     * behind its last fragment; list_mixed_pixels() reduces it to the index of its first fragment */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;
@@ -38,7 +39,7 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
     return true;
 }
 
-/* ---- joined ----------------------------------------------------------------------------------------------------- */
+/* ---- join fragments in a sheet ---------------------------------------------------------------------------------- */
 
 /* Marks a pixel as mixed, so that all of its fragments are listed and merged one by one. Does nothing if it is marked
  * already. The fragment that m->joined contains for the pixel is counted as its first fragment. */
@@ -118,7 +119,7 @@ static bool join_fragments_of_strip(const comp_owned *owned, uint32_t strip, mer
     return true;
 }
 
-/* ---- listed ----------------------------------------------------------------------------------------------------- */
+/* ---- list the fragments of mixed pixels ------------------------------------------------------------------------- */
 
 /* Returns the first mixed pixel with at least the index `from`; COMP_STRIP_PIXELS if there is none. */
 static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)

@@ -29,7 +29,8 @@ typedef struct comp_merge_output {
     comp_deep_list *deep; /* lists that receive the samples, one per thread; NULL if deep samples are not requested */
 } comp_merge_output;
 
-/* Merges one pixel of the image; its fragments are reordered. Local; any number of threads may call it at once. */
+/* Merges the fragments of one pixel of the image. The order of `items` is changed. Local; any number of threads may
+ * call it at once. */
 comp_pixel comp_pixels_blend(const comp_merge_output *merged, fragment *items, int64_t count, uint32_t pixel);
 
 #endif

@@ -15,8 +15,8 @@ static bool has_radices(int number, int most)
     return number == 1;
 }
 
-/* Returns the largest product of numbers from 2 to `most` that does not exceed `number`. It is more than half of
- * `number`, because the largest power of two that does not exceed `number` is such a product. */
+/* Returns the largest product of numbers from 2 to `most` that does not exceed `number`. The result is more than half
+ * of `number`, because the largest power of two that does not exceed `number` is such a product. */
 static int find_largest_product(int number, int most)
 {
     while (!has_radices(number, most)) number--;

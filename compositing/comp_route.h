@@ -12,8 +12,8 @@
  *     radix-k       a round within each node, then rounds of at most k ranks
  *     binary swap   rounds of two ranks, regardless of nodes
  *
- * Ranks whose places are behind those of the owners send all their fragments to a partner before the first round; an
- * owner has at most one such partner. */
+ * A rank whose place comes after those of the owners cannot own pixels. Before the first round it sends all its
+ * fragments to one of the owners, its partner. An owner has at most one such partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 
@@ -45,7 +45,7 @@ typedef struct comp_route {
     int ranks, owners;
     comp_nodes nodes;
     int round_count;
-    int radix[COMP_MOST_ROUNDS];
+    int radix[COMP_MOST_ROUNDS]; /* for each round, the number of ranks that exchange fragments with each other */
     /* largest number of ranks in a dense round; comp_route_of() sets it to the maximum, COMP_MAX_DENSE_RANKS */
     int max_dense_ranks;
 } comp_route;
@@ -58,7 +58,8 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
 int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* Returns the distance between partners of the round: the product of the radices of earlier rounds. */
+/* Returns the difference between the places of partners whose digits of this round differ by 1: the product of the
+ * radices of earlier rounds. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)
@@ -80,8 +81,8 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
     return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* The owner of a block is stored as a rank in its claim; replaces it by the rank's place. If the place is not one of
- * the first ones, which belong to owners, the block is given to the rank's partner. */
+/* Replaces the rank in each claim, which is the owner of a block, by the rank's place. If this place is not one of the
+ * first ones, which belong to owners, the block is given to the rank's partner. */
 void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */

@@ -19,8 +19,8 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* Width of the renderer's tiles, and number of pixels of a tile. Larger tiles are processed correctly, but more
- * slowly. */
+/* ROW_PIXELS is the width of the renderer's tiles, and MOST_PIXELS the number of pixels of such a tile. Larger tiles
+ * are processed correctly, but more slowly. */
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block of memory that grows without keeping its contents. */

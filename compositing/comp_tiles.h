@@ -27,8 +27,8 @@ insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int
  * not overlap. */
 bool comp_tiles_blend(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
-/* Ends the tiles. statistics receives the number of blended fragments and the time of the slowest thread. overlaps
- * receives the pixels whose fragments overlap; it may be NULL. */
+/* Frees the scratch memory after the last tile. statistics receives the number of blended fragments and the time of the
+ * slowest thread. overlaps receives the pixels whose fragments overlap; it may be NULL. */
 void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
 
 #endif

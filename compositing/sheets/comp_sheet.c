@@ -17,7 +17,7 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
 }
 
 /* Plans how to pack a sheet with many gaps: its `count` values are first moved together, so that they fill rows of 16
- * without gaps. A row with few values would take as long to pack as a full one. */
+ * without gaps. This saves time, because a row with few values takes as long to pack as a full one. */
 static void plan_compact(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;

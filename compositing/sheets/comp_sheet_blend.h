@@ -18,8 +18,8 @@ enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WO
 
 /* ---- joining ---------------------------------------------------------------------------------------------------- */
 
-/* Returns the lanes in the mask `both` in which the fragment of `other` is nearer than the fragment of `all`. Equal
- * depths and NaN are compared by fragment_compare(). */
+/* Returns the lanes in the mask `both` in which the fragment of `other` is nearer than the fragment of `all`. Fragments
+ * whose t_in are equal or NaN are compared by fragment_compare(). */
 ROWS_INLINE lanes find_nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
 {
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);

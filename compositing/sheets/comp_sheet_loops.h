@@ -12,7 +12,8 @@
 typedef struct sheet_plan {
     int rows, count; /* rows: number of rows that contain pixels; count: number of pixels in all rows */
     bool is_sparse;  /* true: the sheet is compacted before packing, so that fresh and source are not set */
-    /* For each row that contains pixels. row: index of the row in the strip; number: number of pixels in the row. */
+    /* For each row that contains pixels: row is its index in the strip, number the number of its pixels, mask the bit
+     * mask of the lanes with a pixel, and fresh the bit mask of the fresh lanes. */
     uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
     uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose most recent value predicts it */

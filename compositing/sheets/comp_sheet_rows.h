@@ -10,8 +10,8 @@
  * because the word equals the preceding word. */
 enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
-/* Returns the nearest lane to the left of `lane` whose bit in the mask `known` is set, or the nearest such lane to the
- * right if there is none. */
+/* Returns the nearest lane below `lane` whose bit in the mask `known` is set. If there is none, returns the lowest lane
+ * whose bit is set. */
 static uint8_t find_nearest_lane(unsigned known, int lane)
 {
     const unsigned left = known & ((1u << lane) - 1);

@@ -6,9 +6,10 @@
 #include "comp_messages.h"
 #include "image.h"
 
-/* Maximum number of children per node of the gather tree. Owners send along a tree of places (comp_route.h): within a
- * compute node every place sends to the node's first place; the first places form a heap with up to COMP_GATHER_FAN
- * children each. Without information about compute nodes each rank is treated as a node of its own. */
+/* Maximum number of children of a place in the gather tree, along which owners send their pixels to rank 0. It is a
+ * tree of places (comp_route.h). Within a compute node, every place sends to the first place of this node. The first
+ * places of all compute nodes form a heap, in which each has up to COMP_GATHER_FAN children. Without information about
+ * compute nodes, each rank is treated as a compute node. */
 enum { COMP_GATHER_FAN = 64 };
 
 /* comp_gather_parent() returns the place to which the given place (>= 1) sends; comp_gather_children() returns the
@@ -24,8 +25,8 @@ typedef struct comp_canvas {
 } comp_canvas;
 
 /* Rank 0 stores the pixels received from other ranks in the canvas, in which its own pixels are stored already.
- * `finished` are this rank's messages to its parent; they are freed. `status` is this rank's status before the call; if
- * it is an error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status.
+ * `finished` are this rank's messages to its parent; the function frees them. `status` is this rank's status before the
+ * call; if it is an error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status.
  * Collective. */
 insitu_status comp_gather(comp_transport *transport, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error);

@@ -1,9 +1,9 @@
 /* In a dense round every partner sends to every other, if necessary an empty message, so every rank knows how many
  * messages to expect. In a sparse round only partners with fragments send, and the number of messages is unknown. Sends
- * are therefore synchronous: they complete when they are received. A rank whose sends have completed enters a
- * nonblocking barrier and continues to receive until all ranks have entered it; then no message is in flight (Hoefler,
- * Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse Data Exchange, 2010). This needs no exchange
- * of counts, only one barrier. */
+ * are therefore synchronous: a send completes only after its message is received. A rank whose sends have completed
+ * enters a nonblocking barrier and continues to receive until all ranks have entered it; then no message is in flight
+ * (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse Data Exchange, 2010). This needs no
+ * exchange of counts, only one barrier. */
 #include "comp_messages.h"
 
 #include <string.h>
@@ -165,7 +165,8 @@ static void make_requests(round *r, comp_messages *out, int partners)
     r->requests = r->transport->reserved_requests;
 }
 
-/* Receives a message that MPI_Mprobe() or MPI_Improbe() has matched. If there is no memory for it, it is discarded. */
+/* Receives a message that MPI_Mprobe() or MPI_Improbe() has matched. Discards the message if there is no memory for
+ * it. */
 static void receive_message(round *r, MPI_Message *found, const MPI_Status *status)
 {
     int bytes = 0;

@@ -2,8 +2,8 @@
  *
  *     message | flag: more follow | parcel | parcel | ...        parcel | owner, records, bytes | sheet | sheet | ...
  *
- * A message is at most COMP_MESSAGE_BYTES long. A rank that runs out of memory can therefore still receive it in a
- * buffer allocated beforehand, and discard it, so that no rank waits. */
+ * A message is at most COMP_MESSAGE_BYTES long. A rank that runs out of memory can therefore receive a message in a
+ * buffer that was allocated beforehand, and discard it, so that the sender does not wait. */
 #ifndef COMP_COMP_MESSAGES_H
 #define COMP_COMP_MESSAGES_H
 
@@ -33,7 +33,7 @@ void comp_messages_append(comp_messages *to, comp_messages *from);
 
 typedef struct comp_parcel {
     uint32_t owner;
-    uint32_t records; /* number of sheets in the parcel */
+    uint32_t records; /* number of fragments or finished pixels in the parcel */
     uint32_t bytes;
     const unsigned char *data;
 } comp_parcel;
@@ -55,7 +55,7 @@ typedef struct comp_writer {
 unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
 /* Appends to the parcel the bytes that the caller has written, from the start of the reserved space up to `end`.
- * `records` is the number of sheets in these bytes. */
+ * `records` is the number of fragments or finished pixels in these bytes. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
 /* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
@@ -74,8 +74,8 @@ insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error
 void comp_transport_close(comp_transport *transport);
 
 /* Runs one round: sends the messages in `out`; *in receives the messages of other ranks; the caller must free them.
- * `status` is this rank's status before the call; if it is an error, nothing is sent and received messages are
- * discarded. Returns this rank's own status. Collective. */
+ * `status` is this rank's status before the call; if it is an error, the rank sends no fragments, and received messages
+ * are discarded. Returns this rank's own status. Collective. */
 insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
                                   comp_messages *in, insitu_status status, base_error *error);
 

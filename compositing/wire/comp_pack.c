@@ -139,7 +139,7 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
 /* Writes the parcels that belong to one partner of the round: those for owners whose place has the digit `digit` in
- * this round. Skips parcels for places that differ from this rank's place in a digit of an earlier round, because these
+ * this round. Skips parcels for places that differ from this rank's place in a digit of an earlier round, because they
  * have been sent in that round. */
 static bool forward_parcels_with_digit(const comp_messages *in, const comp_route *route, int round, int place,
                                        int digit, comp_writer *writer)

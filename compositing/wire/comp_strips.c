@@ -54,7 +54,7 @@ static void find_ranges(const comp_grid *grid, const fragment *items, int64_t fi
     if (range.count) add_range(p, range);
 }
 
-/* Sorts the ranges by strip (counting sort). starts must be 0 before the call. */
+/* Copies the ranges of all parts to out->ranges, sorted by strip (counting sort). starts must be 0 before the call. */
 static void sort_ranges(const part *parts, int part_count, comp_strips *out)
 {
     uint32_t *const starts = out->starts, sum = 0;
@@ -147,8 +147,8 @@ static bool fill_sheet_of_single_fragments(const comp_strips *s, uint32_t strip,
 }
 
 /* Sorts the fragments of one pixel front to back, unless the pixel has very many. Sheet n gets the n-th fragment of
- * every pixel; if pixels are sorted, neighbouring fragments of a sheet mostly belong to the same surface, so that the
- * sheet compresses well. */
+ * every pixel. If each pixel's fragments are sorted, neighbouring fragments of a sheet mostly belong to the same
+ * surface, so that the sheet compresses well. */
 static void sort_pixel(const fragment **order, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
