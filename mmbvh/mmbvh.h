@@ -52,7 +52,8 @@ typedef struct mmbvh {
     mmbvh_compact_node *compact; /* nodes in the compact layout; NULL in the reference layout */
     mmbvh_grid grid;             /* quantization grid of the compact layout */
     int64_t node_count;          /* number of nodes; 0 if there are no cells */
-    uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
+    uint32_t *cells;             /* cell indices, leaf by leaf; in a tree over the boxes of meshes
+                                    (mmbvh_build_boxes()): mesh indices */
     int64_t cell_count;
     double origin[3]; /* origin of the tree's coordinates; a position has the coordinates (position - origin) * scale */
     double scale;

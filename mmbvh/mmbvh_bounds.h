@@ -6,8 +6,8 @@
 #include "mmbvh_item.h"
 #include "mmbvh_sweep.h"
 
-/* Reads the boxes of `count` cells. Coordinates are those of the grid or of the given boxes; they are not transformed
- * to the tree's coordinates. */
+/* Reads the boxes of `count` cells. The boxes are in the source's coordinates, which are those of the grid or of the
+ * given boxes; they are not transformed to the tree's coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
 /* Reads the boxes of `count` cells as boxes of floats, without transforming them to the tree's coordinates. Used only
@@ -21,8 +21,8 @@ typedef void bounds_extend(const bounds_source *source, const uint32_t *cells, i
                            fetch_box *box);
 
 struct bounds_source {
-    const grid *g; /* grid whose cells are read; NULL if the boxes are given */
-    double origin[3];
+    const grid *g;    /* grid whose cells are read; NULL if the boxes are given */
+    double origin[3]; /* origin and scale define the tree's coordinates, (position - origin) * scale */
     double scale;
     const float *lower, *upper; /* corners of the given boxes, count × 3 values */
     int64_t box_count;          /* number of boxes, including those of ghosts */

@@ -1,9 +1,9 @@
 /* Defines the compact node layout: 24 bytes per node instead of the 40 bytes of the thesis's node.
  *
  * The tree has a grid of 2^20 steps per axis; a step is a power of two. A box has one 32-bit word per axis: its lower
- * bound in whole steps in the low bits, and its extent as a small floating-point number in the high bits. The precision
- * of a box is the coarser of a millionth of the tree's size and 1/256 of the box's own size, so that boxes of cells
- * much smaller than others still have a useful shape:
+ * bound in whole steps in the low bits, and its extent as a small floating-point number in the high bits. A box is
+ * rounded by about a millionth of the tree's size or 1/256 of the box's size, whichever is larger, so that boxes of
+ * cells much smaller than others still have a useful shape:
  *
  *      31    28 27          20 19                     0
  *     | exponent | mantissa   | lower bound in steps   |     extent = 16 (1 + mantissa / 256) 2^exponent - 16

@@ -198,7 +198,7 @@ static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *
     return range;
 }
 
-/* A bounding box in double, in the grid's own coordinates. */
+/* A bounding box in double precision, in the coordinates of the grid or of the tree. */
 typedef struct fetch_box {
     double lower[3];
     double upper[3];

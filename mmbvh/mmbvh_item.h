@@ -6,7 +6,8 @@
  *
  * The union of two boxes is therefore the maximum of each lane. Subtracting the vector with its halves exchanged gives
  * twice the centroid minus TOP in the upper half, and the negative of that in the lower half; bounds of centroids are
- * therefore maxima too. These boxes determine only the choice of planes, not the bounds of the nodes. */
+ * therefore maxima too. TOP is ITEM_TOP. The rounded boxes of items determine only the choice of planes, not the bounds
+ * of the nodes. */
 #ifndef MMBVH_ITEM_H
 #define MMBVH_ITEM_H
 
@@ -86,9 +87,9 @@ static inline lanes item_extent(lanes box)
                    (ulanes)lanes_set1(ITEM_TOP)); /* the extent of an empty box wraps around */
 }
 
-/* Returns the terms xy + yz and zx of half the surface area, for two boxes whose extents are in lanes 0 to 2 and 4 to
- * 6. Lanes 0 and 1 of the result belong to the first box, lanes 2 and 3 to the second one. Lanes 3 and 7 of the extents
- * are ignored. */
+/* Returns half the surface area as two summands, xy + yz and zx, for two boxes whose extents are in lanes 0 to 2 and in
+ * lanes 4 to 6. Lanes 0 and 1 of the result belong to the first box, lanes 2 and 3 to the second one. Lanes 3 and 7 of
+ * the extents are ignored. */
 static inline ivec4 item_area_terms(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);

@@ -13,7 +13,8 @@ enum {
     PREFETCH_VERTICES = 24
 };
 
-/* The boxes of consecutive cells of the tree's list. Lane 3 holds the range of the values. */
+/* The boxes of consecutive cells of mmbvh.cells, beginning with the one at index `first`. Lane 3 of a box's lower and
+ * upper corner holds the lowest and the highest value of the cell. */
 typedef struct part {
     int64_t first;
     int64_t unusable;     /* number of cells with non-finite values */
@@ -56,8 +57,8 @@ MMBVH_INLINE fetch_float_box read_cell(const sweep *s, int64_t cell, const pass_
 }
 
 /* Prefetches one vertex of a hex whose connectivity was prefetched earlier; the hex's other vertices are usually near
- * this one. Cells other than hexes are skipped, because a vertex of tets is shared by so many cells that it is usually
- * in the cache already. */
+ * this one. Cells other than hexes are skipped: a vertex of tets belongs to so many cells that it is usually in the
+ * cache already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const pass_constants pass)
 {
     const grid *g = s->source->g;
@@ -123,8 +124,8 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
     }
 }
 
-/* first_cell() returns the list index of the first cell below a node, and end_of_cells() the index behind its last
- * cell. */
+/* first_cell() returns the index, in mmbvh.cells, of the first cell below a node; end_of_cells() returns one more than
+ * the index of the last. */
 static int64_t first_cell(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);

@@ -19,8 +19,8 @@ typedef struct rows_ranges {
  * neighbours along an axis of a lattice, and the values must be floats or doubles at vertices. */
 bool rows_can_read(const grid *g, const grid_field *field);
 
-/* Searches the cells with indices from `from` to `end` - 1 for the first drawn cell, and computes the ranges of this
- * cell and of the drawn cells that follow it in its row, at most ROWS_CELLS in all. Cells in the padding and in ghost
+/* Searches the cells with indices from `from` to `end` - 1 for the first drawn cell. Computes the ranges of this cell
+ * and of the drawn cells that follow it in its row, at most ROWS_CELLS cells in all. Cells in the padding and in ghost
  * layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
 bool rows_compute_cell_ranges(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 

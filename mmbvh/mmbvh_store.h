@@ -20,8 +20,8 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
 mmbvh_grid store_make_grid(const float lower[3], const float upper[3]);
 
 /* Corrects the box that store_compact() has stored in a node if rounding has made it too small: enlarges the stored box
- * step by step, until it contains the box from `lower` to `upper`. Returns false if the latter box is not within the
- * grid. */
+ * step by step, until it contains the box from `lower` to `upper`. Returns false if the box from `lower` to `upper` is
+ * not within the grid. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
 /* Stores the smallest representable box that contains the given box. The given box is in lanes 0 to 2; lane 3 must be

@@ -1,4 +1,5 @@
-/* Bottom-up passes over a tree: leaves are computed from their cells, and inner nodes from their children.
+/* Bottom-up passes that compute the bounds or ranges of a tree's nodes: those of leaves from their cells, and those of
+ * inner nodes from their children.
  *
  * Nodes are numbered depth first by pairs: the descendants of a node are contiguous, and children come after parents. A
  * pass from the last node to the first therefore visits every child before its parent, and the descendants of two
@@ -20,8 +21,8 @@ typedef struct sweep_sum {
     double area_change; /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
-/* Computes the nodes from end - 1 down to `first` from their cells and children. These nodes are the root alone, a pair
- * of siblings alone, or a pair of siblings and all their descendants. The interval may be empty. */
+/* Computes the bounds or ranges of the nodes from end - 1 down to `first`. These nodes are the root alone, a pair of
+ * siblings alone, or a pair of siblings and all their descendants. The interval may be empty. */
 typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -30,7 +31,7 @@ struct sweep {
     const grid *g;
     const grid_field *field;
     grid_array values;           /* values of the field's component, one per vertex or cell */
-    const float *box_ranges;     /* ranges of the boxes of a parent tree: low and high for each box */
+    const float *box_ranges;     /* for a tree over the boxes of meshes: the low and the high end of each box's range */
     const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
     mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
     int64_t range_max;           /* maximum number of nodes per run; 0: no limit other than the size of a task */
@@ -56,7 +57,7 @@ sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field,
  * `ranges` has a low and a high value per mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
-/* Returns a sweep that computes the bounds. */
+/* Returns a sweep that computes the bounds of the nodes from the boxes of the source. */
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
 /* If the coordinates are floats, changes a sweep of bounds so that it reads the cells of many nodes in one pass. */

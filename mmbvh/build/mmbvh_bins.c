@@ -177,8 +177,8 @@ float bins_compute_cost_bound(const item *items, int64_t count)
     return terms[0] + terms[1];
 }
 
-/* Partitions without unpredictable branches: every item is swapped with the first item of the right side, and the left
- * side then grows by one if the item belongs to it. */
+/* Partitions without unpredictable branches: every item is swapped with the first item of the right side. If the item
+ * belongs to the left side, the left side then grows by one. */
 int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };

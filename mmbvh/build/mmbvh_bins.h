@@ -12,13 +12,14 @@
 
 enum {
     BINS_MAX = 16,
-    BINS_SAMPLED = 2048, /* minimum number of items of a node that is sampled */
+    BINS_SAMPLED = 2048, /* nodes with at least this number of items are split by a sample of their items */
     /* sampling stride: only every BINS_STRIDE-th item is binned; the resulting splits are as good as with all items */
     BINS_STRIDE = 7
 };
 
-/* Maps (2 * centroid - ITEM_TOP), which item_centroid() returns, to a bin on each axis. ITEM_TOP is the largest
- * coordinate of an item (mmbvh_item.h). Lanes 4 to 6 repeat lanes 0 to 2, so that two items are mapped at once. */
+/* Maps v = 2 * centroid - ITEM_TOP, which item_centroid() returns, to one of `count` bins on each axis: bin (v -
+ * origin) * factor / 2^16, rounded down. ITEM_TOP is the largest coordinate of an item (mmbvh_item.h). Lanes 4 to 6
+ * repeat lanes 0 to 2, so that two items are mapped at once. */
 typedef struct bin_mapping {
     ulanes origin;
     lanes factor;
@@ -38,8 +39,9 @@ typedef struct bin_split {
 
 /* The data of three bins, one per axis, that have the same index on their axes. The struct fills one cache line. */
 typedef struct bin {
-    lanes boxes[3]; /* one box per axis; lanes 3 and 7 are scratch */
-    uint32_t counts[4];
+    lanes boxes[3];     /* one box per axis; lanes 3 and 7 contain no bounds, and lane 3 counts items while they are
+                           added */
+    uint32_t counts[4]; /* number of items in each axis's bin; element 3 is not used */
 } bin;
 
 typedef struct bins {

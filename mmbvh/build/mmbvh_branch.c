@@ -1,7 +1,8 @@
 /* Each node is a task. A node of many items processes them in chunks, which are tasks too. First the chunks fill bins;
  * the merged bins do not depend on the order of merging. After the plane has been chosen, each chunk is partitioned in
- * place. The total number of left items determines the border between both sides. The number of right items in front of
- * the border equals the number of left items behind it. These items are swapped, in order.
+ * place. Items of the left child are called left items. Their total number is the index of the border between both
+ * sides. The number of right items in front of the border equals the number of left items behind it. These items are
+ * swapped, in order.
  *
  *      chunk 0        chunk 1        chunk 2
  *     | l l l r r r | l l r r r r | l l l l r r |

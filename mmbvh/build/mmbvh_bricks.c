@@ -25,7 +25,7 @@ enum { SMALL_SIDE = 8, SMALL_CELLS = 64, LEAF_COST = 24 };
 typedef struct bricks {
     topology_build *build;
     const grid_lattice *lattice;
-    double edge[3]; /* mean lengths of the cells' edges along each axis, times the number of samples */
+    double edge[3]; /* for each axis, the sum of the lengths of the sampled cells' edges; only the ratios are used */
     uint32_t *cells;
     /* lowest cost of a small box, indexed by the numbers of cells along its sides */
     int costs[SMALL_SIDE + 1][SMALL_SIDE + 1][SMALL_SIDE + 1];
@@ -62,7 +62,8 @@ static double compute_edge_length(const grid *g, int64_t vertex, int axis)
     return sqrt(sum);
 }
 
-/* Computes the relative mean edge lengths from samples spread over the whole lattice. */
+/* Computes, for each axis, a number proportional to the mean length of the cells' edges along it, from samples spread
+ * over the whole lattice. */
 static void measure_edges(const grid *g, double out[3])
 {
     enum { SAMPLES = 5 };

@@ -183,9 +183,10 @@ void morton_make_keys(const bounds_source *source, const morton_coder *coder, ui
 
 /* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
-/* The counts of a radix sort that begins with the highest digit: how many keys have each value of this digit.
- * Neighbouring cells mostly have neighbouring indices, so that consecutive keys are written to few output streams. The
- * keys with the same digit then fit in a core's cache, in which they are sorted completely. */
+/* The counts of a radix sort that begins with the highest digit: how many keys have each value of this digit. The sort
+ * first moves the keys to one group per value of the digit. Neighbouring cells mostly have neighbouring indices, so
+ * that consecutive keys go to few groups. A group usually fits in a core's cache, in which it is then sorted
+ * completely. */
 typedef struct digit_counts {
     int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS]; /* number of keys of each chunk with each value of the digit */
 } digit_counts;

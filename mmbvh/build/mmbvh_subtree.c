@@ -3,8 +3,8 @@
  * sizes differ by orders of magnitude, the boxes are computed anew from the vertices, in steps of a finer grid. */
 #include "mmbvh_subtree.h"
 
-/* Minimum number of grid steps along the longest side; with fewer, rounding changes surface areas by more than 3
- * percent. */
+/* Minimum number of grid steps along the longest side of a node's box; with fewer, rounding changes surface areas by
+ * more than 3 percent. */
 enum { COARSE = 64 };
 
 bool subtree_needs_finer_grid(lanes bounds, const item_grid *grid)

@@ -74,8 +74,8 @@ static void write_links(topology *t, const mmbvh *tree, int64_t below)
     t->links = NULL;
 }
 
-/* Writes the root of t to the node `slot` and its descendants to the nodes from `below` on; returns the index behind
- * the last one. */
+/* Writes the root of t to the tree's node `slot`, and the descendants of the root to the nodes from `below` on. Returns
+ * the index after the last of them. */
 static int64_t write_nodes(topology *t, const mmbvh *tree, int64_t slot, int64_t below)
 {
     if (!t->children[0]) {

@@ -12,8 +12,8 @@
 
 enum {
     TOPOLOGY_SUBTREE_CELLS = 16384, /* maximum number of cells in a subtree: cells and nodes fit in a core's cache */
-    /* nodes of this depth or a larger one are split into halves with equal numbers of cells, so that trees of 2^32
-     * cells stay within the maximum depth */
+    /* nodes at this depth in the tree, or deeper, are split into halves with equal numbers of cells, so that trees of
+     * 2^32 cells stay within the maximum depth */
     TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32
 };
 
@@ -47,8 +47,8 @@ static inline int64_t topology_new_pair(topology_scratch *s)
 typedef struct topology {
     int64_t first, count;         /* the node's range in the tree's cell list */
     struct topology *children[2]; /* children of an inner node; NULL if the node is a subtree */
-    topology_link root;
-    topology_link *links; /* all nodes of the subtree below its root */
+    topology_link root;           /* link of the subtree's root */
+    topology_link *links;         /* all nodes of the subtree below its root */
     int64_t link_count;
 } topology;
 
