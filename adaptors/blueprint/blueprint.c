@@ -17,7 +17,7 @@ typedef struct known_mesh {
     int64_t number;      /* number of the block, or WHOLE_MESH */
     int64_t step_number; /* value of the step counter when the mesh was last set */
     uint64_t name_hash, coordinate_hash, cell_hash, fields_hash;
-    insitu_mesh mesh;       /* description that was passed to the session; mesh.lattice is not valid */
+    insitu_mesh mesh;       /* description that was passed to the session; the pointer mesh.lattice is not valid */
     insitu_lattice lattice; /* description that was passed to the session, if the mesh is a uniform block */
     uniform_block uniform;
     owned_arrays owned;
@@ -33,12 +33,12 @@ struct insitu_blueprint {
     int64_t step_number;   /* step counter: the number of steps so far */
     bool has_pending_sets; /* true if something has been set for the next step */
     node_log log;          /* errors and reports of the calls since the last step */
-    bool has_cycle; /* set if a domain that was set for the next step has state/cycle; `cycle` is the largest of these
-                       values */
+    bool has_cycle; /* true if a domain that was set for the next step states state/cycle; `cycle` is then the largest
+                       such value */
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
-    /* for each mesh, the lattice of this rank's blocks; this list was the input of the last named_lattices_agree() */
+    /* the input of the last call of named_lattices_agree(): for each mesh, the lattice of this rank's blocks */
     named_lattices lattices;
     named_lattices common; /* for each mesh in `lattices`, the lattice of the blocks of all ranks */
     insitu_blueprint_report report;
@@ -124,8 +124,8 @@ static void remove_known_mesh(insitu_blueprint *adaptor, int index)
 
 /* ---- one topology ----------------------------------------------------------------------------------------------- */
 
-/* Reads state/insitu_changed, in which the domain may state what has changed; returns false if it does not, so that
- * hashes must be compared. */
+/* Reads state/insitu_changed, in which the domain may state what has changed. Returns false if the domain does not
+ * state it; the caller must then compare hashes. */
 static bool read_changes(const node *domain, unsigned *changed)
 {
     const char *word;
@@ -143,8 +143,8 @@ static bool read_changes(const node *domain, unsigned *changed)
     return true;
 }
 
-/* Stores the hashes of the mesh's arrays and fields in *known, and returns the INSITU_CHANGED flags of those that
- * differ from the previous step. */
+/* Returns what has changed in the mesh since the previous step, as INSITU_CHANGED flags. If the domain states the
+ * changes, returns these; otherwise, compares hashes of the mesh's arrays. Stores the new hashes in *known. */
 static unsigned find_changes(const node *domain, const blueprint_mesh *mesh, uint64_t fields_hash, known_mesh *known)
 {
     unsigned changed = 0;
@@ -213,8 +213,9 @@ static bool set_mesh_and_fields(insitu_blueprint *adaptor, const node *domain, c
     return blueprint_set_fields(domain, topology->name, mesh, &target, &adaptor->report.fields);
 }
 
-/* Sets a mesh, or a block of the mesh of this name. The blocks of a mesh must have the same fields. A block with other
- * fields than the blocks before it becomes a mesh of its own, and the block's number is added to the name. */
+/* Passes the mesh `name`, or the block `number` of this mesh, to the session. The blocks of a mesh must have the same
+ * fields. A block with other fields than the blocks before it becomes a mesh of its own, and the block's number is
+ * added to the name. */
 static bool pass_block(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
                        const char *name, int64_t number)
 {

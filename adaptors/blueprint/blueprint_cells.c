@@ -54,7 +54,8 @@ static bool require_integers(const node *parent, const char *path, node_array *o
 
 /* ---- cells and faces of different sizes ------------------------------------------------------------------------- */
 
-/* Lists of vertices or faces, one after the other in connectivity. */
+/* For each cell or face, the list of its vertices; or for each polyhedron, the list of its faces. `connectivity`
+ * contains these lists one after the other. */
 typedef struct row_list {
     node_array connectivity, sizes, offsets;
     int64_t count; /* number of lists in connectivity */
@@ -66,7 +67,7 @@ static int64_t row_size(const row_list *rows, int64_t i)
     return rows->sizes.count >= 0 ? node_get_element(&rows->sizes.array, i) : rows->vertices;
 }
 
-/* Computes the offsets if the node has none. */
+/* Computes the offsets of the lists from their sizes, for a node without offsets. */
 static bool make_offsets(const node *of, row_list *rows, owned_arrays *owned)
 {
     const int64_t bytes = rows->count * (int64_t)sizeof(int64_t);

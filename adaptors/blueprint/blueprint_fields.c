@@ -15,8 +15,8 @@ typedef struct blueprint_field {
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
 } blueprint_field;
 
-/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. A layer of
- * ghost cells has the bits in VTK_LAYER_BITS. */
+/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. A cell in a
+ * layer of ghost cells has at least one of VTK_LAYER_BITS. */
 enum { VTK_HIDDEN_BITS = 1 | 8 | 32, VTK_LAYER_BITS = 1 | 32 };
 
 /* ---- which fields ----------------------------------------------------------------------------------------------- */
@@ -67,8 +67,7 @@ static bool find_field(const node *field, blueprint_field *out, bool reports_lef
     return node_require(&out->field_node, "values", &out->values_node);
 }
 
-/* Iterates over the fields of a topology. next_field() returns false behind the last field, or if a field is
- * invalid. */
+/* Iterates over the fields of a topology. next_field() returns false after the last field, or if a field is invalid. */
 typedef struct field_walk {
     const node *domain;
     const char *topology;
@@ -102,7 +101,7 @@ static void get_element_counts(const blueprint_mesh *mesh, bool is_element, int6
     }
 }
 
-/* Reads the field's offsets and strides; without them the field is packed. */
+/* Reads the field's offsets and strides. A field without strides has no padding between its elements. */
 static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0};
@@ -155,7 +154,7 @@ static void set_cell_strides(blueprint_mesh *mesh, const blueprint_field *field)
 
 /* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
-/* Describes the array of one component, beginning with the mesh's first vertex or cell. */
+/* Stores in *out the array of one component of the field, beginning with the mesh's first vertex or cell. */
 static bool read_component(const node *values, const blueprint_mesh *mesh, const blueprint_field *field,
                            insitu_array *out)
 {
@@ -184,7 +183,8 @@ static unsigned char *make_flags(const node *of, blueprint_mesh *mesh, const ins
     return own;
 }
 
-/* Combines the flags of the cells in this range of indices by a bitwise or. */
+/* Returns the bitwise or of the flags of all cells whose indices are at least first[] and less than end[] along each
+ * axis. */
 static int64_t combine_flags(const insitu_array *flags, const int64_t strides[3], const int64_t first[3],
                              const int64_t end[3])
 {
@@ -196,7 +196,8 @@ static int64_t combine_flags(const insitu_array *flags, const int64_t strides[3]
     return any;
 }
 
-/* Finds the bounding box of the cells in which no bit of the mask is set. If there is none, the box is empty. */
+/* Finds the bounding box of the cells in which no bit of the mask is set. If there is no such cell, the box is
+ * empty. */
 static void find_inner_cells(const insitu_array *flags, const int64_t strides[3], const int64_t counts[3], int64_t mask,
                              int64_t first[3], int64_t end[3])
 {
@@ -219,9 +220,9 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
 }
 
 /* Returns the bitwise or of the cells' flags. If the block has a level of refinement, the lattice's interior is first
- * reduced so that it excludes the ghost layers (the cells whose flags have a bit of the mask), and only flags in the
- * interior are read. The reason is that a block hides the coarser cells below its interior, but must not hide those
- * below its ghost layers. */
+ * reduced so that it excludes the ghost layers, which are the cells whose flags have a bit of the mask. Only flags in
+ * the interior are then read. The reason is that a block hides the coarser cells below its interior, but must not hide
+ * those below its ghost layers. */
 static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
 {
     insitu_lattice *l = &mesh->lattice;
@@ -344,7 +345,8 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-/* Describes the field's components in a new array; the caller must free it. Returns NULL on an error. */
+/* Returns a new list of the arrays of the field's components; the caller must free the list. Returns NULL on an
+ * error. */
 static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values_node);
@@ -385,7 +387,7 @@ static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, 
     return !status || node_set_error(&field->field_node, "", status, "%s", insitu_error(target->session));
 }
 
-/* Finds the next field that can be drawn on the mesh. Returns false behind the last field, or if a field is invalid. */
+/* Finds the next field that can be drawn on the mesh. Returns false after the last field, or if a field is invalid. */
 static bool find_next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
 {
     while (next_field(w)) {

@@ -20,8 +20,8 @@ uint64_t blueprint_hash_text(const char *text)
     return hash;
 }
 
-/* Hashes contiguous bytes in several independent lanes, because each multiplication depends on the previous one of its
- * lane. */
+/* Hashes contiguous bytes in several independent lanes. A multiplication must wait for the previous one of the same
+ * lane only, so that the processor computes all lanes at the same time. */
 static uint64_t hash_bytes(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];

@@ -102,7 +102,7 @@ void named_lattices_free(named_lattices *list)
     *list = (named_lattices){NULL, 0};
 }
 
-/* The data that the ranks exchange. */
+/* The buffers with which a rank receives the lattices of all ranks. */
 typedef struct lattice_exchange {
     MPI_Comm comm;
     int ranks;
@@ -131,7 +131,8 @@ static bool gather_sizes(lattice_exchange *x, const named_lattices *own, int *to
     return true;
 }
 
-/* Combines the items of all ranks for each mesh, in the order of the ranks. */
+/* Lists the meshes of `own` in *out, each with the common lattice of the blocks of all ranks. `all` contains the items
+ * of all ranks, in the order of the ranks. */
 static void merge_all(const named_lattices *own, const named_lattice *all, int count, named_lattices *out)
 {
     for (int i = 0; i < own->count; i++) out->items[i] = (named_lattice){.mesh = own->items[i].mesh};
@@ -184,7 +185,8 @@ static bool move_axis_to_common_origin(const uniform_block *block, const common_
     return true;
 }
 
-/* Computes the number of the block's cells per cell of the coarsest level. Returns false if it is not an integer. */
+/* Computes how many cells of the block, along an axis, are as long as one cell of the coarsest level. Returns false if
+ * it is not an integer. */
 static bool compute_axis_refinement(double coarsest, double spacing, int64_t *out)
 {
     const double ratio = coarsest / fabs(spacing), whole = nearbyint(ratio);

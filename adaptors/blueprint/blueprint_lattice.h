@@ -11,8 +11,8 @@
 /* A uniform block as its node describes it. */
 typedef struct uniform_block {
     insitu_lattice lattice;
-    bool exists; /* false if the mesh is not uniform */
-    bool has_first, has_level;
+    bool exists;               /* false if the mesh is not uniform */
+    bool has_first, has_level; /* as in blueprint_mesh (blueprint_mesh.h) */
 } uniform_block;
 
 typedef struct common_lattice {

@@ -33,7 +33,7 @@ bool blueprint_read_topology(const node *domain, const node *topology, blueprint
 /* Frees the tables that are needed only until the mesh is set, but not the arrays in `owned`. */
 void blueprint_mesh_free_tables(blueprint_mesh *mesh);
 
-/* Reads the cells of an unstructured topology, after its vertices. */
+/* Reads the cells of an unstructured topology. The vertices must have been read already. */
 bool blueprint_read_unstructured(const node *topology, blueprint_mesh *out);
 
 /* Reads the strides of a lattice's element fields, and the ghost flags of the topology. */
@@ -48,7 +48,7 @@ typedef struct mesh_target {
     int64_t number; /* number of the block, or WHOLE_MESH */
 } mesh_target;
 
-/* Sets the mesh or block; NULL removes it. */
+/* Sets `mesh` on the session as the target's mesh or block. If `mesh` is NULL, removes the target. */
 insitu_status blueprint_set_target(const mesh_target *target, const insitu_mesh *mesh);
 
 /* Sets all fields of the topology on the target, and increases *count by their number. Returns false if the node is

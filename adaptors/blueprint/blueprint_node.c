@@ -215,8 +215,8 @@ bool node_is_integers(const node_array *array)
     return array->array.type != INSITU_FLOAT32 && array->array.type != INSITU_FLOAT64;
 }
 
-/* Finds the single number at a path. Returns false if it is missing, and sets the error if it is needed or is not a
- * single number. */
+/* Finds the single number at a path. Returns false if there is no number. Sets the error if a required number is
+ * missing, or if the node at the path is not a single number. */
 static bool find_number(const node *parent, const char *path, bool is_required, node *found, node_array *out)
 {
     if (!node_find(parent, path, found))

@@ -59,7 +59,8 @@ bool node_require(const node *parent, const char *path, node *out);
 int64_t node_child_count(const node *parent);
 void node_get_child(const node *parent, int64_t number, node *out);
 
-/* Reads a string; it belongs to the node. Returns false and sets the error if there is no string at the path. */
+/* Reads a string, whose memory belongs to the node. Returns false and sets the error if there is no string at the
+ * path. */
 bool node_read_string(const node *parent, const char *path, const char **out);
 
 /* node_read_integer() and node_read_real() read a number. If the number is missing, *out does not change; this is an

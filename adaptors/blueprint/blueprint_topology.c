@@ -28,7 +28,8 @@ static bool set_vertex_counts(const node *of, const char *path, const int64_t co
     return true;
 }
 
-/* Sets packed strides for vertices and cells. */
+/* Sets the strides of the lattice's vertices and cells to those of arrays without padding, and stores the numbers of
+ * vertices and cells. */
 static void pack_lattice(blueprint_mesh *out)
 {
     int64_t counts[3];

@@ -1,8 +1,8 @@
 /* Everything is drawn in linear light on premultiplied colours, so that the edges of lines and letters are smooth on
- * any background. Strokes with is_behind are drawn behind the picture, the background behind these strokes, and
- * everything else in front of the picture. Sizes are proportional to the picture's height, so that a picture of twice
- * the size looks the same at a higher resolution. Text has a halo in the background's colour, so that it is legible on
- * any picture and hides little of it. layout.cpp computes the positions. */
+ * any background. From back to front, the layers are: the background, strokes with is_behind, the picture, and all
+ * other decorations. Sizes are proportional to the picture's height, so that a picture of twice the size looks the same
+ * at a higher resolution. Text has a halo in the background's colour, so that it is legible on any picture and hides
+ * little of it. layout.cpp computes the positions. */
 #include "decorate.h"
 #include "layout.h"
 #include "typeface.h"
@@ -47,7 +47,7 @@ void blend_background(drawing &s)
     }
 }
 
-/* Returns the fraction of the pixel [x, x + 1) that the interval covers. */
+/* Returns the fraction of the pixel [x, x + 1) that the interval from low to high covers. */
 double pixel_coverage(double low, double high, int x)
 {
     return std::clamp(std::min(high, x + 1.0) - std::max(low, static_cast<double>(x)), 0.0, 1.0);
@@ -72,8 +72,8 @@ double compute_distance_to_stroke(const insitu_stroke &line, double x, double y)
     return std::hypot(x - (line.from[0] + at * dx), y - (line.from[1] + at * dy));
 }
 
-/* Visits row by row the columns that the line may cross, so that the cost of a line is proportional to its length and
- * not to its bounding box. */
+/* Draws a line. In each row of pixels, visits only the columns that the line may cross, so that the cost is
+ * proportional to the line's length and not to the area of its bounding box. */
 void draw_stroke(drawing &s, const insitu_stroke &line, double width, const float colour[3], double opacity = 1)
 {
     const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
@@ -156,7 +156,8 @@ void draw_stroke_with_halo(drawing &s, const insitu_stroke &line, double width, 
 
 /* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
-/* Interpolates linearly between the table's entries, as the renderer does. */
+/* Computes the colour at `place`, from 0 at the bar's lower end to 1 at its upper end. Interpolates linearly between
+ * the entries of the colour table, as the renderer does. In a banded bar each entry fills one band. */
 void colour_at(const insitu_colour_bar &bar, double place, float out[3])
 {
     const int last = bar.colour_count - 1;
@@ -197,7 +198,8 @@ void draw_out_of_range_boxes(drawing &s, const insitu_colour_bar &bar, const blo
     if (bar.above) fill(s, above, bar.above, 1), draw_frame(s, above);
 }
 
-/* Draws a colour bar with its ticks on the right. The numbers and the label are drawn as lines of the block's text. */
+/* Draws a colour bar with its ticks on the right. draw_block() draws the numbers and the label, as lines of the block's
+ * text. */
 void draw_bar(drawing &s, const block &b)
 {
     const insitu_colour_bar &bar = s.decorations.bars[b.index];

@@ -40,7 +40,8 @@ std::size_t sample_count(const insitu_deep &deep, std::size_t first, std::size_t
     return count;
 }
 
-/* Deep EXR files allow only compression methods of single rows. The compression level is the same as for flat files. */
+/* Describes the file to OpenImageIO. Deep EXR files allow only compression methods that compress each row separately.
+ * The compression level is the same as for flat files. */
 OIIO::ImageSpec describe(int width, int height)
 {
     OIIO::ImageSpec spec(width, height, CHANNELS, OIIO::TypeDesc::FLOAT);

@@ -54,8 +54,8 @@ bool is_opaque(const insitu_image &image)
 }
 
 /* Converts linear values from 0 to 1 to sRGB codes by table lookup instead of computing a power each time. A bin of the
- * table is narrower than any code (1/4096 compared with 1 / (255 * 12.92) = 1/3295), so that a bin contains at most two
- * codes. */
+ * table is narrower than the range of linear values of any code (1/4096 compared with 1 / (255 * 12.92) = 1/3295), so
+ * that a bin contains at most two codes. */
 class srgb_codes
 {
   public:
@@ -114,8 +114,8 @@ template <typename code> void encode_pixel(const float *pixel, std::size_t chann
     if (channels == 4) out[3] = quantize_to_code<code>(alpha);
 }
 
-/* Encodes to sRGB codes that are not premultiplied, with alpha if channels is 4. A pixel that equals its predecessor,
- * as is frequent in the background, is copied from it instead of being encoded. */
+/* Converts all pixels to sRGB codes that are not premultiplied, with alpha if channels is 4. A pixel that equals the
+ * previous one, as is frequent in the background, gets a copy of that pixel's codes. */
 template <typename code> std::vector<code> encode(const insitu_image &image, std::size_t channels)
 {
     std::vector<code> codes(pixel_count(image) * channels);
@@ -199,7 +199,7 @@ void write_pixels(const insitu_image &image, const layout &l, const void *pixels
         static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
     const std::size_t raw = row * static_cast<std::size_t>(image.height);
     std::vector<unsigned char> bytes;
-    /* the size of random data is an upper bound, because it does not compress; file formats add headers to it */
+    /* the largest file is that of random data, which do not compress: it takes the raw size and the format's headers */
     bytes.reserve(raw + raw / 8 + ADDED);
     const memory_reserve reserve(TABLES + ROWS * row);
     encode_file(l.file_name, l.describe(image, l), pixels, bytes);

@@ -169,7 +169,7 @@ bool is_wrapped_at_blanks(const std::string &text, const std::vector<std::string
     return joined == text || lines.size() == 1;
 }
 
-/* Adds lines to the block, aligned to the side of the anchor. */
+/* Adds lines of text to the block, aligned to the side of the picture at which the anchor is. */
 void align_lines(const layout_state &s, const std::vector<std::string> &lines, insitu_anchor at, block &b)
 {
     double y = b.bounds.y0 + pixels(padding, b.size) + baseline * b.size;
@@ -206,7 +206,7 @@ bool place_words(layout_state &s, int index)
 /* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
 /* The colour bars at one side of the picture, with texts of the height `size`. All bars get the width of the widest
- * one, and above each bar there is space for the highest label. */
+ * one, `width`. Above each bar there is a space of height `head`, in which the highest label fits. */
 struct bar_group {
     std::vector<int> bars;
     insitu_anchor anchor;

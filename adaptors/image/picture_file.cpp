@@ -47,7 +47,7 @@ class descriptor
 
 /* ---- names ---- */
 
-/* Returns a random name. It is short enough for any file system that accepts the picture's own name. */
+/* Returns a random name for a temporary file, short enough for every usual file system. */
 std::string random_name()
 {
     static std::random_device source;

@@ -36,8 +36,8 @@ bool succeeded(FT_Error code)
 
 /* ---- finding a font --------------------------------------------------------------------------------------------- */
 
-/* Returns the folders in this one, sorted by name, without hidden ones. It calls opendir(), because the directory
- * iterators of the C++ library terminate the process if memory runs out, and so does glob() of glibc 2.36. */
+/* Returns the subfolders of the folder, sorted by name, without hidden ones. The function calls opendir(), because the
+ * directory iterators of the C++ library terminate the process if memory runs out, and so does glob() of glibc 2.36. */
 std::vector<std::string> find_folders(const std::string &folder)
 {
     std::vector<std::string> out;
@@ -124,7 +124,8 @@ std::string known_fonts()
 
 /* ---- characters ------------------------------------------------------------------------------------------------- */
 
-/* Decodes the character at `at` and advances `at` behind it. Returns the replacement character for invalid UTF-8. */
+/* Decodes the character that begins at byte `at`, and advances `at` to the first byte after it. Returns the replacement
+ * character for invalid UTF-8. */
 char32_t next_character(const std::string &text, std::size_t &at)
 {
     static const char32_t least[] = {0, 0x80, 0x800, 0x10000};
@@ -170,7 +171,7 @@ int advance_of_loaded(FT_Face face)
     return static_cast<int>((face->glyph->advance.x + 32) >> 6);
 }
 
-/* Loads each glyph and calls visit(x) with the pen's position; returns the position behind the last glyph. */
+/* Loads each glyph and calls visit(x) with the pen's position; returns the pen's position after the last glyph. */
 template <typename visitor>
 int lay_out_glyphs(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
 {
@@ -198,7 +199,7 @@ void draw_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &cov
         }
 }
 
-/* Covers the pixels within the stroker's radius of the loaded glyph. */
+/* Draws the loaded glyph, widened by the stroker's radius: calls `cover` for each of its pixels. */
 void draw_widened_glyph(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
 {
     FT_Glyph glyph = nullptr;

@@ -1,7 +1,7 @@
 /* The public functions of the VTK adaptor. They determine which meshes a data object contains, which arrays these use,
  * and how long the arrays must live. A session reads borrowed arrays during a step. Therefore a mesh_part keeps
- * everything that one mesh uses (references to VTK's arrays, and conversions), until a new mesh of that name has been
- * set on the session or the mesh has been removed from the session. */
+ * everything that one mesh uses: references to VTK's arrays, and converted arrays. A mesh_part is kept until a new mesh
+ * of the same name has been set on the session, or the mesh has been removed. */
 #include "insitu/vtk.h"
 
 #include <exception>
@@ -86,8 +86,8 @@ constexpr size_t longest_list =
 constexpr unsigned char hiding_bits =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
 
-/* Sets the ghost flags. VTK's byte has bits that hide a cell and bits that only describe it. If VTK's own array
- * contains only hiding bits, it is used unchanged. If nothing is hidden, no array is set. */
+/* Sets the mesh's ghost flags. VTK's flags have bits that hide a cell and bits that only describe it. If VTK's array
+ * contains only hiding bits, the mesh borrows it. If no cell is hidden, the mesh gets no ghost flags. */
 void set_ghosts(vtkDataSet *grid, const vtkSmartPointer<vtkUnsignedCharArray> &ghosts, const cell_list &cells,
                 const std::string &what, conversion_log &log, mesh_part &p)
 {
@@ -184,7 +184,7 @@ void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string
     }
 }
 
-/* Fills p from grid. If there is nothing to draw, p.mesh.cell_count is 0. */
+/* Stores the mesh and the fields of grid in p. If there is nothing to draw, p.mesh.cell_count is 0. */
 void make_mesh_part(vtkUnstructuredGrid *grid, const std::string &name, set_result &out, mesh_part &p)
 {
     const std::string what = "mesh '" + name + "'";
@@ -217,7 +217,7 @@ void make_mesh_part(vtkUnstructuredGrid *grid, const std::string &name, set_resu
     out.cells_set += cells.count;
 }
 
-/* Fills p from a structured data set. Returns false if data is not structured. */
+/* Stores the lattice and the fields of a structured data set in p. Returns false if data is not structured. */
 bool make_lattice_part(vtkDataSet *data, const std::string &name, set_result &out, mesh_part &p)
 {
     const std::string what = "mesh '" + name + "'";
@@ -295,7 +295,8 @@ void log_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::stri
         log.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
-/* Sets a data set that is neither structured nor an unstructured grid. */
+/* Converts a data set that is neither structured nor an unstructured grid to an unstructured grid, and sets this on the
+ * session. */
 void set_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data,
                    set_result &out)
 {
@@ -318,14 +319,15 @@ std::string make_name_of_blocks(const std::string &name, const mesh_part &p)
     return name + (p.mesh.cell_type == INSITU_QUAD ? "/flat blocks" : "/blocks") + list;
 }
 
-/* The state of setting the leaves of a composite data set. */
+/* A composite data set whose leaves are being set on the session, and the iterator at the current leaf. */
 struct composite_state {
     vtkCompositeDataSet *data;
     vtkCompositeDataIterator *it;
     amr_refinements refinements; /* refinement of each level of overlapping AMR */
 };
 
-/* Describes the position of a grid of overlapping AMR. */
+/* Sets the position and refinement of a grid's lattice within overlapping AMR. Lattices of other composites stay
+ * unchanged. */
 void place_amr_grid(const composite_state &composite, const std::string &what, conversion_log &log,
                     insitu_lattice &lattice)
 {
@@ -350,7 +352,8 @@ bool set_block(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &
     return true;
 }
 
-/* Sets every leaf. Empty leaves are counted, so that a leaf has the same number on all ranks. */
+/* Sets every leaf of a composite data set as a mesh or a block. Empty leaves are counted, so that a leaf has the same
+ * number on all ranks. */
 void set_leaves(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkCompositeDataSet *data,
                 set_result &out)
 {
@@ -373,7 +376,8 @@ void set_leaves(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string 
     }
 }
 
-/* Sets a data set that is not an unstructured grid. */
+/* Sets a data set that is not an unstructured grid on the session: as a lattice if it is structured, and otherwise as
+ * an unstructured grid. */
 void set_other(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data, set_result &out)
 {
     mesh_part new_part;
@@ -398,8 +402,8 @@ void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
-/* Removes the parts that an earlier call set and the current call did not set. If a whole mesh has been replaced by
- * blocks of the same name, nothing must be removed from the session. */
+/* Removes the parts that an earlier call set and the current call did not set. A whole mesh that blocks of the same
+ * name have replaced must not be removed from the session, because this would remove the blocks. */
 void remove_parts_not_set(insitu_vtk_adaptor *adaptor, part_map &parts, const std::set<part_key> &keys)
 {
     for (auto it = parts.begin(); it != parts.end();) {

@@ -53,7 +53,8 @@ template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
     return true;
 }
 
-/* Returns the distance in bytes between blocks if they are equally spaced in ascending order, otherwise 0. */
+/* Returns the distance in bytes between the blocks of an SOA array if they are equally spaced in ascending order,
+ * otherwise 0. */
 template <typename T> int64_t find_block_stride(vtkSOADataArrayTemplate<T> *array)
 {
     auto address = [array](int c) { return reinterpret_cast<uintptr_t>(array->GetComponentArrayPointer(c)); };

@@ -1,4 +1,5 @@
-/* Makes VTK's data arrays readable for libinsitu: they are borrowed if their layout allows it, otherwise copied. */
+/* Makes VTK's data arrays readable for libinsitu. Arrays are borrowed if libinsitu can read their layout, and copied
+ * otherwise. */
 #ifndef VTK_ARRAYS_H
 #define VTK_ARRAYS_H
 

@@ -152,7 +152,7 @@ template <typename Id> struct raw_cells {
     const Id *connectivity;
     int64_t count;
     bool are_higher_known; /* true if cells of higher order are passed as they are. It is false if the grid also
-                              contains polyhedra or polygons, or Lagrange cells of mixed orders. */
+                              contains polyhedra or polygons, or Lagrange cells whose order differs between axes. */
 
     const cell_conversion &conversion_of(int64_t cell) const
     {
@@ -259,7 +259,8 @@ void fill_converted_cells(const raw_cells<Id> &raw, const cells_with_faces &with
     *offsets = at;
 }
 
-/* Names the conversions that the cells need, for example "voxels reordered, faces of polyhedra shared". */
+/* Returns a list of the conversions that the cells of these types need, for example "voxels reordered, faces of
+ * polyhedra shared". */
 std::string find_conversion_reason(const std::array<int64_t, 256> &by_type)
 {
     const char *const reasons[] = {"some cells not drawn",

@@ -25,7 +25,7 @@ struct cell_counts {
 
 struct cell_list {
     int64_t count = 0;
-    bool is_one_to_one = true;   // true if cell i is VTK's cell i; otherwise source contains VTK's cell
+    bool is_one_to_one = true;   // true if every cell i of the mesh is VTK's cell i; `source` is then not used
     std::vector<int64_t> source; // index of VTK's cell for each cell of the mesh
 };
 

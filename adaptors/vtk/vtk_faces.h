@@ -34,8 +34,8 @@ class face_list
     bool add_stream(vtkUnstructuredGrid *grid, int64_t cell);
     void add_prism(const int64_t *points, int sides);
 
-    /* starts: offsets of the faces; face_points: the points of all faces, in order around each face; sorted: the same
-     * points, sorted within each face */
+    /* starts: for each face, the index of its first point in face_points, and a final entry, the total; face_points:
+     * the points of all faces, in order around each face; sorted: the same points, sorted within each face */
     std::vector<int64_t> starts{0}, face_points, sorted;
     std::unordered_multimap<uint64_t, int64_t> by_points; // indices of faces, by a hash of their points
     std::vector<int64_t> cell_starts{0}, cells;

@@ -83,7 +83,7 @@ void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
                    is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));
 }
 
-/* Shares the list of polygons; returns false if data contains other cells. */
+/* Makes grid use data's list of polygons without a copy. Returns false if data contains other cells too. */
 bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
 {
     if (!data || data->GetNumberOfVerts() > 0 || data->GetNumberOfLines() > 0 || data->GetNumberOfStrips() > 0)
@@ -99,7 +99,7 @@ bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
     return true;
 }
 
-/* Lists the cells of any other data set one by one. */
+/* Copies the cells of any other data set to grid, one by one. */
 void set_cells(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkIdList> points;
@@ -134,7 +134,8 @@ void set_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
     grid->SetPoints(points);
 }
 
-/* Flags cells with a hidden point as hidden. In structured grids VTK hides such cells without a flag of their own. */
+/* Flags cells with a hidden point as hidden. VTK hides such cells of structured grids although the cells themselves
+ * have no flag. */
 void hide_cells_of_hidden_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     insitu_lattice lattice = {};

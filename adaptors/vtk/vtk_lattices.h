@@ -20,8 +20,8 @@ namespace insitu_vtk
 bool count_cells_of_lattice(vtkDataSet *data, int64_t cells[3]);
 
 /* Fills in the lattice and the coordinates of mesh from data, with the same vertices and cells in the same order.
- * Conversions are stored in `held` and counted. mesh.lattice points to lattice. Returns false without changes if data
- * is of another class or has fewer than two axes with cells. */
+ * Arrays that had to be converted are stored in `held`, and `log` counts their bytes. mesh.lattice is set to point to
+ * lattice. Returns false without changes if data is of another class or has fewer than two axes with cells. */
 bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, conversion_log &log, insitu_mesh &mesh,
                   insitu_lattice &lattice);
 

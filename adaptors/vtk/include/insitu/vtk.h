@@ -15,10 +15,10 @@
  * become fields.
  *
  * The leaves of a composite are numbered in the order of VTK's iterator, including empty leaves. Images, rectilinear
- * and curvilinear grids become blocks of one mesh (insitu_set_block), so that there is no seam between them. For
- * overlapping AMR this mesh is called name. For other composites, those with the fields a and b become blocks of
- * "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other leaves become the
- * meshes "name/0", "name/1", ....
+ * and curvilinear grids become blocks of one mesh (insitu_set_block), so that there is no seam between them. In
+ * overlapping AMR this mesh is called "name". In other composites, structured leaves with the fields a and b become
+ * blocks of the mesh "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other
+ * leaves become the meshes "name/0", "name/1", ....
  *
  * The names contain the fields because all blocks of a mesh must have the same fields on all ranks, and one rank does
  * not know the fields of the other ranks' blocks. Scenes hardly need them: `mesh: name` stands for all leaves, and a
@@ -36,9 +36,10 @@
  * (11) and pixels (8) are drawn as hexahedra and quads, with a copied connectivity. The face streams of polyhedra (42)
  * are copied to a list of faces that cells share. Pentagonal and hexagonal prisms (15, 16) become polyhedra too.
  * Quadratic and Lagrange cells are borrowed, and are drawn as linear cells between their points. For cells of the types
- * 33, 34 and 37, the first 20, 6 and 14 points are copied. Bezier cells, cells of several orders, and all cells of
- * higher order in grids with polygons or polyhedra are copied, drawn as linear cells with the same corners, and
- * reported. All other cells are reported and not drawn, including polyhedra without faces, lines and points.
+ * 33, 34 and 37, the first 20, 6 and 14 points are copied. Bezier cells, cells whose order differs between axes, and
+ * all cells of higher order in grids with polygons or polyhedra are copied, drawn as linear cells with the same
+ * corners, and reported. All other cells are reported and not drawn, including polyhedra without faces, lines and
+ * points.
  *
  * Of polygonal data the points are borrowed, and the polygons too if there are no lines, points or strips.
  *
@@ -72,8 +73,8 @@ typedef struct insitu_vtk_report {
     int64_t cells;        /* number of cells set, including ghosts */
     int64_t cells_split;  /* number of cells split into several; currently always 0 */
     int64_t cells_linear; /* number of cells of higher order that are drawn as linear cells with the same corners. These
-                             are Bezier cells, cells of several orders or with points missing, and all cells of higher
-                             order in grids with polygons or polyhedra. */
+                             are Bezier cells, cells whose order differs between axes or with points missing, and all
+                             cells of higher order in grids with polygons or polyhedra. */
     int64_t cells_flat;   /* number of points and lines, which are not drawn */
     int64_t cells_not_drawn; /* number of 3-D cells not drawn: unknown types, too few points or faces */
     int64_t bytes_borrowed;  /* size in bytes of VTK's arrays that are borrowed */
