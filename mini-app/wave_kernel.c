@@ -7,9 +7,9 @@
  *
  *     p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
  *
- * The reconstruction needs no gradients. Let P_v be the state at a vertex, averaged from the cells around it, and let
- * P_f and P_c be its means over the vertices of a face and of a cell. The linear function through these values, shifted
- * so that its mean in the cell is q, has this value at the face:
+ * The reconstruction needs no gradients. Let P_v be the state at a vertex, averaged from the cells around it. Let P_f
+ * be the mean of P_v over the vertices of a face, and P_c the mean over the vertices of a cell. The linear function
+ * through these values, shifted so that its mean in the cell is q, has this value at the face:
  *
  *     q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
  *
@@ -104,8 +104,8 @@ INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8
     }
 }
 
-/* Computes the mean over a face's vertices. Opposite vertices of a quad are summed first, so that the mean is rounded
- * in the same way for both of its cells. */
+/* Computes the mean of the states at a face's vertices. Opposite vertices of a quad are summed first, so that the mean
+ * is rounded in the same way for both of its cells. */
 INLINE void compute_face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
 {
     const int8_t *v = shape->face[f];
@@ -172,8 +172,9 @@ static void find_jumps(const wave_grid *grid, double time_step)
     }
 }
 
-/* The state on one side of a face. It is the mean over the face's vertices plus the jump of the cell on this side;
- * layer is the cell's layer. If the face is on a wall, the far side has no cell, and its jump is NULL. */
+/* The state on one side of a face: the mean of the states at the face's vertices, plus the jump of the cell on this
+ * side. `layer` is the medium's layer in which this cell lies. If the face is on a wall, the far side has no cell, and
+ * its jump is NULL. */
 typedef struct face_side {
     const real *jump;
     int layer;
@@ -185,7 +186,8 @@ INLINE face_side get_face_side(const wave_grid *grid, int32_t cell)
                     : (face_side){(const real *)grid->jump + 4 * (int64_t)cell, grid->layers[cell]};
 }
 
-/* Computes p* and u* of a face with normal n, from the mean over the face's vertices and the jumps of both sides. */
+/* Computes p* and u* of a face with normal n, from the mean of the states at the face's vertices and the jumps of the
+ * cells on both sides. */
 INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
                           face_side near, face_side far, real star[2])
 {

@@ -35,8 +35,8 @@ typedef struct wave_grid {
     wave_values state;               /* pressure and velocity of each cell */
     wave_values vertex_state;        /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
     wave_values coordinates;         /* x, y, z of each vertex, displaced if vertices move */
-    void
-        *jump; /* real, interleaved; for each cell: 4 components of its state minus its mean over the cell's vertices */
+    void *jump; /* real, interleaved; for each cell, the 4 components of its jump: its state at the middle of the time
+                   step minus the mean of the states at its vertices (first-order scheme: its state) */
     double modulus[WAVE_LAYERS_MAX], density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
     bool second_order; /* true if vertex_state is used for a second-order reconstruction */
     bool reflecting;   /* true if the walls reflect, false if they absorb */

@@ -19,9 +19,9 @@ typedef struct wave_medium {
 } wave_medium;
 
 /* A source that injects volume at the rate Q(t) = strength amplitude tau exp(-(pi frequency tau)^2) with tau = t -
- * delay, repeated with the period. It is distributed over a Gaussian ball of this radius. Far away the pressure is
- * density / (4 pi r) Q'(t - r / speed), a Ricker wavelet. The total injected volume is zero, because Q is an odd
- * function of tau. */
+ * delay, repeated with the period. It is distributed in space by a Gaussian function with the standard deviation
+ * `radius`. Far away the pressure is density / (4 pi r) Q'(t - r / speed), a Ricker wavelet. The total injected volume
+ * is zero, because Q is an odd function of tau. */
 typedef struct wave_source {
     double position[3];
     double frequency;

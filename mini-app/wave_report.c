@@ -1,5 +1,5 @@
-/* Each column shows the maximum over all ranks. The times in a line may therefore belong to different ranks, and need
- * not add up to the total. */
+/* Each column of the printed table shows the maximum over all ranks. The times in a line may therefore belong to
+ * different ranks, and need not add up to the total. */
 #include "wave_report.h"
 
 #include <stdio.h>

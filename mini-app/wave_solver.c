@@ -1,7 +1,7 @@
 /* A step computes the jumps of own cells and exchanges them, applies fluxes and the source, exchanges states, and
  * updates vertices. The computation uses the mesh at rest and the equations of small displacements. If vertices move,
- * only the drawn mesh changes: each vertex is displaced with its exaggerated velocity, as the ground in an
- * earthquake. */
+ * only the drawn mesh changes: each of its vertices moves with the velocity of the ground there, exaggerated by the
+ * factor `swell`. */
 #include "wave_solver.h"
 
 #include <math.h>

@@ -37,7 +37,8 @@ namespace
 using vector = std::array<double, 3>;
 
 constexpr vector default_direction = {1, 0.8, 1.2};
-constexpr double interior_threshold = 0.35; // fraction of the field's range below which the interior is shown
+constexpr double interior_threshold = 0.35; // the interior is shown if the outer surface shows less than this fraction
+                                            // of the field's range
 
 using grid_list = std::vector<vtkUnstructuredGrid *>;
 
@@ -145,7 +146,8 @@ double projected_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *poin
     return area;
 }
 
-/* Adds the faces of a grid's outer surface that point to the viewer. */
+/* Adds to `visible` the value and twice the projected area of each face of the grid's outer surface that points to the
+ * viewer. */
 void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, const vector &to_viewer,
                        std::vector<visible_value> &visible)
 {
@@ -168,7 +170,8 @@ void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, cons
     }
 }
 
-/* Returns the fraction of the field's range that is visible on the outer surface; 1 if it cannot be computed. */
+/* Returns how much of the field the outer surface shows: the length of the interval between the 5th and the 95th
+ * percentile of its values, as a fraction of the field's range. Returns 1 if it cannot be computed. */
 double visible_range_fraction(const grid_list &grids, const std::string &field, const vector &to_viewer)
 {
     double low = std::numeric_limits<double>::infinity(), high = -low, area = 0, below = 0;

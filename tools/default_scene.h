@@ -1,4 +1,4 @@
-/* Writes the scene for files if the user gives none. */
+/* Writes the scene that is drawn if the user gives data files but no scene. */
 #ifndef DEFAULT_SCENE_H
 #define DEFAULT_SCENE_H
 

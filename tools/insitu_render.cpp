@@ -73,7 +73,8 @@ template <typename Body> void run_on_all_ranks(const rank_info &w, Body body)
     throw_if_any_failed(w, message);
 }
 
-/* A session and its adaptor. The destructor closes both in the right order. */
+/* A session and its adaptor. The destructor closes the adaptor before the session, because the adaptor uses the
+ * session. */
 class render_session
 {
   public:
@@ -166,7 +167,8 @@ void show_warnings(const rank_info &w, const std::string &text, run_state &run, 
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
 }
 
-/* Returns the warnings about cells, counted over all ranks; the adaptor counts only those of its own rank. */
+/* Returns warnings with numbers of cells, summed over all ranks; each rank's adaptor counts only the cells of this
+ * rank. */
 std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;

@@ -1,7 +1,7 @@
-/* Finds the neighbour across each face. Faces are hashed by their vertex ids. Every face of an own cell must be shared
- * with exactly one other cell, or lie on a wall of the box. The table stores the first cell and face of each key. When
- * the second cell is found, the two become neighbours; the entry remains and is marked, so that a third cell with the
- * same face is detected. */
+/* Finds the neighbour across each face. Faces are hashed by their vertex ids. Every face of a cell of this rank must
+ * belong to exactly one other cell too, or lie on a wall of the box. The hash table stores, under a face's vertex ids,
+ * the first cell that has this face. When a second cell with the face is found, the two cells become neighbours. The
+ * entry remains and is marked, so that a third cell with the face is detected. */
 #include "wave_faces.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Quads are bilinear patches. The area vector of a quad is half the cross product of its diagonals, even if the quad is
- * warped. Its contribution to a volume is the mean over the two possible splits into triangles; this mean is exact for
- * the patch. Therefore the volumes of all cells add up to the volume of the box, and the area vectors of a cell add up
- * to zero. */
+ * warped. The contribution of a quad to a cell's volume is the mean of those of its two possible splits into triangles;
+ * this mean is exact for the patch. Therefore the volumes of all cells add up to the volume of the box, and the area
+ * vectors of a cell add up to zero. */
 #include "wave_geometry.h"
 
 static void subtract_vectors(const double a[3], const double b[3], double out[3])

@@ -17,7 +17,8 @@
 static const int8_t corner_offset[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* The outward faces of a cube, each with its axis and side. */
+/* For each face of a cube: its corners, in an order in which the normal points outward; the axis parallel to the
+ * normal; and the step to the neighbouring cube along this axis. */
 static const struct {
     int8_t corner[4];
     int8_t axis, step;

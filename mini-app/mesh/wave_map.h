@@ -14,8 +14,8 @@ typedef struct wave_map {
 /* Returns the value of the key, or -1 if it is not in the map. */
 int32_t wave_map_find(const wave_map *map, int64_t key);
 
-/* Returns the value of the key. A key that is not in the map is inserted with this value. Returns -1 if memory ran
- * out. */
+/* Returns the value of the key. If the key is not in the map, inserts it with `value` and returns `value`. Returns -1
+ * if memory ran out. */
 int32_t wave_map_insert(wave_map *map, int64_t key, int32_t value);
 
 void wave_map_free(wave_map *map);

@@ -13,7 +13,7 @@
 typedef struct wave_link {
     int rank;
     int32_t send_begin, send_end;       /* range of the link's cells in wave_mesh.sends */
-    int32_t receive_begin, receive_end; /* range of halo cells received over the link */
+    int32_t receive_begin, receive_end; /* range of the indices of halo cells whose values the other rank sends */
 } wave_link;
 
 typedef struct wave_mesh {

@@ -10,7 +10,8 @@ static double compute_block_surface(const wave_lattice *lattice, const int block
     return s[0] * s[1] + s[1] * s[2] + s[2] * s[0];
 }
 
-/* Chooses the factors of the number of ranks for which the surface between blocks is smallest. */
+/* Chooses the number of blocks along each axis. The product of these numbers is the number of ranks; of all such
+ * choices, the one with the smallest surface between blocks is taken. */
 static void choose_blocks(const wave_lattice *lattice, int ranks, int best[3])
 {
     best[0] = ranks;

@@ -6,7 +6,8 @@
 
 typedef enum wave_partition_kind {
     WAVE_BLOCK,       /* one box of cubes per rank, as close to a cube as the number of ranks allows */
-    WAVE_MORTON,      /* one contiguous range of the Morton curve per rank, all of the same length */
+    WAVE_MORTON,      /* one contiguous range of the Morton curve per rank; the ranges differ by at most one cube in
+                         length */
     WAVE_RANDOM,      /* owners chosen by a hash of the cube's id */
     WAVE_CHECKERBOARD /* rank (i + j + k) modulo ranks: cubes that share a face have different owners */
 } wave_partition_kind;

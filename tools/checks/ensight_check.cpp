@@ -1,5 +1,5 @@
-/* Checks EnSight Gold files by the description of the format. In a geometry file, parts in [] are present if the header
- * says so; n and m are counts that precede:
+/* Checks EnSight Gold files by the description of the format. In a geometry file, items in [] are present only if the
+ * header says so, n is the preceding count, and "nodes" is the number of nodes of an element:
  *
  *     [format] 2 descriptions, node id, element id, [extents: 6 floats]
  *     part     = "part" number description sections
@@ -336,7 +336,8 @@ std::vector<case_file> list_files(const std::string &case_path)
     return files;
 }
 
-/* Returns the files that match a pattern, by the digits that its stars represent. */
+/* Returns the paths of the files that match the pattern. Each path is stored under the part of the file's name that the
+ * pattern's stars represent, which is the step number. A file without stars is stored under "". */
 std::map<std::string, std::string> matching_files(const std::string &folder, const std::string &pattern)
 {
     const size_t first = pattern.find('*'), last = pattern.find_last_of('*');
@@ -363,7 +364,7 @@ void check_ensight(const std::string &case_path)
     const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
     const std::vector<case_file> files = list_files(case_path);
     std::map<std::string, std::vector<geometry>>
-        geometries; // geometries of the steps, by the digits in the file's name
+        geometries; // geometries of the steps in each geometry file, by the step number in the file's name
     encoding how = encoding::text;
     for (const case_file &file : files) {
         if (file.components > 0) continue;

@@ -44,14 +44,14 @@ std::string last_bytes(const std::string &path, int64_t count)
     return bytes;
 }
 
-/* Checks that only blanks and comments follow the last tag. */
+/* Throws unless the last 4096 bytes of the file contain the last tag of VTK's XML formats, </VTKFile>. */
 void check_last_tag(const std::string &path)
 {
     const bool is_whole = last_bytes(path, 4096).find("</VTKFile>") != std::string::npos;
     if (!is_whole) throw std::runtime_error(path + ": is cut short: it has no </VTKFile> at its end");
 }
 
-/* Checks whether the beginning of the file is that of VTK's XML formats. */
+/* Checks whether the file's extension is that of one of VTK's XML formats. */
 bool is_vtk_xml(const std::string &path)
 {
     const std::string name = path.substr(path.find_last_of('/') + 1);
@@ -61,7 +61,7 @@ bool is_vtk_xml(const std::string &path)
            (ending.compare(0, 3, ".vt") == 0 && ending != ".vtk" && ending != ".vtkhdf");
 }
 
-/* Checks whether a tag contains name="0". */
+/* Checks whether the attribute `name` of a tag is 0. */
 bool is_zero(const std::string &tag, const std::string &name)
 {
     return tag.find(' ' + name + "=\"0\"") != std::string::npos;

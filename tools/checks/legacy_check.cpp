@@ -102,7 +102,7 @@ class legacy_parser
         return std::stoll(text);
     }
 
-    /* Returns the size of this many values in bytes, or -1 for a type whose values differ in size. */
+    /* Returns the size of this many values in bytes, or -1 if the type is unknown or its values differ in size. */
     int64_t bytes_of(int64_t values, const std::string &type) const
     {
         static const std::map<std::string, int64_t> sizes = {

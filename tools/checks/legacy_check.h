@@ -9,7 +9,7 @@ namespace render_tool
 {
 
 /* Reads the file to its end by the counts that it declares. Throws std::runtime_error with the file's name if it ends
- * too early. Composite data sets, and anything behind an unknown keyword, are not checked. */
+ * too early. Composite data sets, and sections after one with an unknown keyword, are not checked. */
 void check_legacy(const std::string &path);
 
 } // namespace render_tool

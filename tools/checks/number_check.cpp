@@ -21,7 +21,7 @@ bool is_blank(int c)
     return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-/* Advances `at` behind any digits; returns their number. */
+/* Advances `at` past the digits that begin at this index, if any; returns their number. */
 size_t skip_digits(const std::string &word, size_t &at)
 {
     const size_t first = at;

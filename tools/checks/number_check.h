@@ -12,7 +12,7 @@ namespace render_tool
 /* Checks whether a word is a number in the syntax of C: 1, -2.5, 1e-101, nan, inf. */
 bool is_number(const std::string &word);
 
-/* Throws std::runtime_error that names the line of the file with this byte offset. */
+/* Throws a std::runtime_error whose message contains the word and the number of the file's line at this byte offset. */
 [[noreturn]] void refuse_number(const std::string &path, const std::string &word, int64_t offset);
 
 /* Throws std::runtime_error, as refuse_number() does, if a data array of a VTK XML file contains a word that is not a

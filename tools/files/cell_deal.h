@@ -13,8 +13,8 @@ namespace render_tool
 
 enum class partition {
     block,       // each rank gets a contiguous range of cells, in the order of the file
-    random,      // by a hash of the cell's number, which is the worst case for compositing
-    checkerboard // by the position of the cell's centre in a lattice of 8 × 8 × 8 over the bounds
+    random,      // ranks chosen by a hash of the cell's number; this partition is the worst case for compositing
+    checkerboard // ranks chosen by the position of the cell's centre in a lattice of 8 × 8 × 8 boxes over the bounds
 };
 
 bool parse_partition(const std::string &text, partition &out);

@@ -1,5 +1,5 @@
-/* VTK's filter vtkExtractCells is not used because it reads beyond the end of face lists that are shorter than the
- * cells, as VTK's own readers may produce them. */
+/* VTK's filter vtkExtractCells is not used, because it reads beyond the end of an array of face locations that has
+ * fewer entries than the grid has cells. VTK's own readers may produce such arrays. */
 #include "cell_extract.h"
 
 #include <algorithm>
@@ -45,8 +45,8 @@ class renumbering
     vtkNew<vtkIdList> used_;
 };
 
-/* The face streams of polyhedra. The location of a cell is the index where its stream begins, or -1: number of faces,
- * then for each face its number of points and its points. */
+/* The face streams of polyhedra. A cell's stream consists of the number of its faces and, for each face, its number of
+ * points and its points. The location of a cell is the index at which its stream begins, or -1 if it has none. */
 class face_streams
 {
   public:

@@ -1,7 +1,7 @@
-/* VTK 9.1 assumes that the N cells of a zone are the sections whose first element number is between 1 and N. CGNS has
- * no such rule: a section of boundary elements may come first or in between, and VTK then reads triangles and quads of
- * the boundary as cells. VTK also computes wrong positions for the vertices of a section, unless the sections of cells
- * are also the first ones of the zone in the file.
+/* VTK 9.1 assumes that the N cells of a zone are the elements of those sections whose first element number is between 1
+ * and N. CGNS has no such rule: a section of boundary elements may come first or in between, and VTK then reads
+ * triangles and quads of the boundary as cells. VTK also computes wrong positions for the vertices of a section, unless
+ * the sections of cells are also the first ones of the zone in the file.
  *
  * For such zones VTK is given a different file of a few kilobytes. Its nodes are links to those of the user's file,
  * except for the element numbers and the order of sections. In the new file the zone's cells, which are its elements
@@ -253,7 +253,7 @@ class node_file
     }
 };
 
-/* Writes the file of links. */
+/* Writes a file whose nodes are links to the nodes of the user's file. */
 class link_writer
 {
   public:

@@ -1,12 +1,13 @@
 /* VTK 9.1 determines the cell type of a block from the first letters of its element type and a short list of numbers of
- * nodes. If the number is not in the list, it uses the linear type, but advances through the connectivity by the number
- * of nodes of the linear type: for example, the second cell of a block of HEX9 elements begins at the ninth node of the
- * first element.
+ * nodes. If the number of nodes is not in the list, VTK uses the linear type, and advances through the connectivity by
+ * the number of nodes of the linear type. For example, the second cell of a block of HEX9 elements begins at the ninth
+ * node of the first element.
  *
- * The corners are the first nodes of every element type. For a block whose elements have a different number of nodes
- * than its cells, the cells are therefore created again, from the corners in the file's connectivity. VTK's reader
- * keeps only the points of its own cells; if a number of nodes is unusual, the reader is configured to keep all points,
- * and those that each block uses are extracted here. */
+ * The corners are the first nodes of every element type. If a block's elements have a different number of nodes than
+ * the cells that VTK has made of them, the cells are therefore created again, from the corners in the file's
+ * connectivity. VTK's reader usually keeps only the points of the cells that it has made. If VTK's list lacks the
+ * number of nodes of a block, the reader is configured to keep all points, and the points that each block uses are
+ * extracted here. */
 #include "exodus_reader.h"
 
 #include <algorithm>

@@ -23,7 +23,8 @@ bool find_extent(vtkDataObject *data, extent &out);
 /* Returns the number of cells of two or three dimensions in the extent; 0 if it has fewer dimensions. */
 int64_t cells_of_extent(const extent &whole);
 
-/* A range of cells among all that are distributed. */
+/* A range of the cells that are distributed to ranks: the index of its first cell and its number of cells. `total` is
+ * the number of all distributed cells. */
 struct cell_range {
     int64_t first, count, total;
 };

@@ -1,6 +1,6 @@
-/* The folder of each processor has the layout of a case, so that VTK's reader for complete cases can read it alone,
- * through the name of a file in it that need not exist. VTK's reader for decomposed cases reads all folders on every
- * rank.
+/* The folder of each processor has the layout of a complete case. VTK's reader for complete cases can therefore read a
+ * single processor's folder; it is given the name of a file in this folder, which need not exist. VTK's reader for
+ * decomposed cases reads all folders on every rank.
  *
  *     case/dec.foam
  *     case/processor0/constant/polyMesh/points ...

@@ -13,10 +13,10 @@ namespace render_tool
 {
 
 /* Returns data as a vtkUnstructuredGrid, or, for a composite, as a multiblock with one block per leaf in the order of
- * VTK's iterator; empty leaves are empty blocks. Images, rectilinear and curvilinear grids become hexahedra with VTK's
- * own arrays. Cells that are hidden in these grids, because of a hidden point or, in overlapping AMR, a finer level,
- * get a ghost flag. Unstructured grids are returned unchanged. Throws std::runtime_error, whose message begins with
- * path, if a cell refers to a point that does not exist. */
+ * VTK's iterator; empty leaves are empty blocks. Images, rectilinear and curvilinear grids become hexahedra whose
+ * fields are VTK's arrays without a copy. Cells that are hidden in these grids, because of a hidden point or, in
+ * overlapping AMR, a finer level, get a ghost flag. Unstructured grids are returned unchanged. Throws
+ * std::runtime_error, whose message begins with path, if a cell refers to a point that does not exist. */
 vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &path);
 
 /* Returns data in a form that the VTK adaptor draws. Overlapping AMR, and images, rectilinear and curvilinear grids

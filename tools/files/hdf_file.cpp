@@ -210,7 +210,8 @@ class hdf_reader
     handle file_;
 };
 
-/* The first index of a part in each array, and its counts. */
+/* The position of a part in the file: the index of the part; its first index in the arrays of points, cells,
+ * connectivity ids and offsets; and its numbers of points, cells and ids. */
 struct part_position {
     int64_t part = 0;
     int64_t point = 0, cell = 0, id = 0, offset = 0;

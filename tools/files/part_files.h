@@ -42,7 +42,7 @@ struct nemesis_name {
     size_t digits = 1; // number of digits of the file number
 };
 
-/* Parses path; returns false if it is not such a name. */
+/* Parses path; returns false if it is not the name of a file of a parallel run's Exodus output. */
 bool parse_nemesis(const std::string &path, nemesis_name &name);
 
 /* Returns the name with the extension that determines the kind of file. It differs from the file's name for Nemesis

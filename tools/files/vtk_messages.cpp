@@ -26,7 +26,8 @@ bool contains_any(const char *text, std::initializer_list<const char *> parts)
     return false;
 }
 
-/* Replaces VTK's output window: stores the first error and discards the other messages. */
+/* Replaces VTK's output window. Stores the first error, or warning of a truncated file, and discards all other
+ * messages. */
 class message_catcher : public vtkOutputWindow
 {
   public:
