@@ -24,8 +24,8 @@ typedef struct file_content {
     struct stat stamp; /* result of fstat() when the file was opened */
 } file_content;
 
-/* Reads a file that the user names, of at most limit bytes. Symbolic links are followed. Returns false on a failure:
- * out->text is NULL, and out->stamp is the status of the file if there is one. */
+/* Reads a file that the user names, of at most limit bytes. Symbolic links are followed. Returns false on a failure;
+ * out->text is then NULL, and out->stamp is the result of stat() for the path if something exists there. */
 bool file_read(const char *path, size_t limit, file_content *out, file_failure *failure);
 
 /* Reads a file that the library itself has written and will extend, with the rules of file_read() except for symbolic
@@ -42,7 +42,7 @@ bool file_replace(const char *path, const char *bytes, size_t size, file_failure
  * failure; the file is then unchanged, unless some bytes were written and the file system fails to cut them off. */
 bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure);
 
-/* Returns whether the path leads to anything. */
+/* Returns whether anything exists at the path: a file, a folder or another object. Symbolic links are followed. */
 bool file_exists(const char *path);
 
 #endif

@@ -13,10 +13,12 @@
 
 typedef struct fragment {
     uint32_t pixel; /* index of the pixel, y * width + x, with y = 0 at the top */
-    /* t = (depth - depth_origin) * scale (render.h) of the first sample or of the hit, along the pixel's ray */
+    /* ray parameter t of the first sample, of the begin of the first segment, or of the hit: t = (z - depth_origin) *
+     * scale, where z is the depth along the camera's axis (render.h) */
     float t_in;
-    float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit equal to
-                    t_in */
+    /* end of the fragment: t of its last sample; or, if it consists of segments instead of samples, t at the end of its
+     * last segment or slightly less (kernel_segments.h). For a hit, t_out is equal to t_in. */
+    float t_out;
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* from 0 for an opaque fragment to 1 for a transparent one */
     uint32_t kind;       /* FRAGMENT_VOLUME or FRAGMENT_SURFACE, plus the values that the enum below describes */

@@ -18,10 +18,10 @@ static int find_common_height(int32_t a, int32_t b)
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
 
-/* open[] is a stack of partial results. Each entry blends the fragments read so far of one node of the binary tree,
- * which may contain further fragments. heights[d], for d >= 1, is the height of the lowest tree node that contains both
- * open[d] and open[d - 1]. These heights decrease towards the top of the stack, so that the stack has at most one entry
- * per halving. */
+/* open[] is a stack of partial results. Each entry is the blend of those fragments of one tree node that have been read
+ * so far; fragments of this node that are read later are added to it. heights[d], for d >= 1, is the height of the
+ * lowest tree node that contains both open[d] and open[d - 1]. These heights decrease towards the top of the stack, so
+ * that the stack has at most one entry per halving. */
 fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];

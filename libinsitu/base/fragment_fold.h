@@ -4,7 +4,8 @@
  * The operation "over" is associative, but its rounding errors are not. The positions of the fragments therefore
  * determine the order of blending: the ray is cut into intervals of a fixed length in t, these into halves, and so on.
  * The fragments of an interval are folded along the binary tree of its halves, whose leaves are the smallest halves. If
- * surfaces divide an interval, the parts between them are folded separately. An empty half does not change any bit.
+ * surfaces divide an interval, the parts between them are folded separately. An empty half does not change any bit
+ * of the result.
  *
  *     |       |       |   x   |   x   |  x    |       |   x   |       |      ((x (x)) (x))  (x)
  *
@@ -19,9 +20,9 @@
 
 #include "fragment.h"
 
-/* The number of intervals per unit of t, and the number of times that an interval is halved. t is near 1 in the
- * scene (render.h), so that a ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that start in
- * the same leaf are folded front to back. */
+/* The number of intervals per unit of t, and the number of times that an interval is halved. The scene has a size
+ * near 1 in t (render.h), so that a ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that start
+ * in the same leaf are folded front to back. */
 enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
 /* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the rank
@@ -33,7 +34,7 @@ enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
 /* Returns the index of the leaf that contains the ray parameter t; indices increase with t. The leaves of one interval
  * differ only in the lowest FRAGMENT_HALVINGS bits of their indices. All t above 1024, about a thousand times the
- * scene's depth, are in one leaf, and so are all t below -1024. */
+ * size of the scene, are in one leaf, and so are all t below -1024. */
 static inline int32_t fragment_find_leaf(float t)
 {
     /* NaN becomes `most`, because both comparisons are false */
@@ -50,9 +51,9 @@ static inline int32_t fragment_interval_number(float t)
  * surface; count >= 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
-/* Folds the fragments of one interval on a rank that has all of the pixel's fragments from depth `begin` to depth
- * `end`. Only halves between these depths are folded. out may be the same as sorted. Returns the number of fragments
- * in out. */
+/* Folds the fragments of one interval on a rank that has all of the pixel's fragments between the ray
+ * parameters `begin` and `end`. Only halves that lie completely between them are folded. out may be the same as sorted.
+ * Returns the number of fragments in out. */
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out);
 
 #endif

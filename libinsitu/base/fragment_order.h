@@ -1,5 +1,5 @@
-/* Defines the order of a pixel's fragments: by depth, at equal depth surfaces before volumes, and then by all other
- * bits. Fragments that compare equal are therefore identical. */
+/* Defines the order of a pixel's fragments: by t_in, at equal t_in with surfaces before volumes, and then by all
+ * other bits of a fragment. Fragments that compare equal are therefore identical. */
 #ifndef BASE_FRAGMENT_ORDER_H
 #define BASE_FRAGMENT_ORDER_H
 

@@ -27,8 +27,9 @@ enum {
 };
 
 /* Converts the flat index n of a vertex or a cell of a lattice (its number) to three indices along the axes. The index
- * along an axis is n % outer / stride, where outer is the next larger stride. Strides are nested, so that each triple
- * of indices has a unique flat index. Flat indices to which no triple belongs are padding in the caller's arrays. */
+ * along an axis is n % outer / stride, where outer is the next larger stride. Each stride is larger than the distance
+ * that the smaller strides cover, so that each triple of indices has a unique flat index. Flat indices to which no
+ * triple belongs are padding in the caller's arrays. */
 typedef struct grid_numbering {
     int64_t stride[3];
     double inverse_stride[3]; /* 1 / the stride of each axis; 0 along an axis with a single index */
@@ -37,8 +38,8 @@ typedef struct grid_numbering {
 } grid_numbering;
 
 /* Returns the index along an axis that belongs to the flat index n. Each quotient (n + 1/2) / stride is rounded down.
- * It is at least 1/2 / stride away from the next integer. The two rounding errors change it by at most n / stride *
- * 2^-52, and therefore by less than this distance if n < 2^51. */
+ * Before that, it is at least 1/2 / stride away from the next integer. The two rounding errors change it by at most n /
+ * stride * 2^-52, and therefore by less than this distance if n < 2^51. */
 static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64_t n)
 {
     const double whole = (double)n, outer = (double)(int64_t)((whole + 0.5) * of->inverse_outer[axis]);
@@ -49,7 +50,7 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 typedef struct grid_axis {
     const double *axis_coordinates; /* coordinates, by index along the axis */
     int64_t count;                  /* number of coordinates along the axis */
-    const grid_numbering *vertices;
+    const grid_numbering *vertices; /* numbering of the lattice's vertices */
     int axis;
 } grid_axis;
 
@@ -121,7 +122,8 @@ typedef struct grid {
     const char *ghosts; /* a flag per cell, nonzero for ghost cells; NULL: there are none */
     int64_t ghosts_stride;
     const grid_lattice *lattice; /* if not NULL, replaces connectivity, offsets and cell_types */
-    /* a bit per cell, set if the cell has no volume and is not drawn; NULL: there are no such cells */
+    /* a bit per cell, set if trees omit the cell because it has no volume, as shells and degenerate cells; NULL: no
+     * cell is omitted for this reason */
     const uint64_t *flat;
     /* The faces of polyhedra. Two cells can share a face. face_count is 0 if there are no polyhedra. */
     int64_t face_count;
@@ -202,7 +204,8 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     return (int64_t)((uint64_t)index - (uint64_t)a->base);
 }
 
-/* Returns the index after the last entry of the i-th cell or face, by an array of offsets. */
+/* Returns the end of the entries of cell i or face i: the index of its last entry plus 1. offsets: the index of the
+ * first entry of each cell or face. */
 static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
 {
     return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);
@@ -408,7 +411,7 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Returns whether the cell is neither a ghost nor flat. Trees contain these cells. */
+/* Returns whether the cell is neither a ghost nor flat. Trees contain only such cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);

@@ -8,10 +8,10 @@
  *             region_leave();
  *         }
  *
- * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are
- * expensive if another process uses a core: at the end of each region, and at each barrier, all threads wait about 4
- * ms until the thread that has lost its core gets it back. The code therefore has few regions, none without work,
- * and schedules their loops dynamically. */
+ * Reductions of floating-point numbers are clauses of the loop and not of the region, so that they end before
+ * region_leave() restores the settings of the thread. Regions are expensive if another process uses a core: at the end
+ * of each region, and at each barrier, all threads wait about 4 ms until the thread that has lost its core gets it
+ * back. The code therefore has few regions, none without work, and schedules their loops dynamically. */
 #ifndef BASE_REGION_H
 #define BASE_REGION_H
 

@@ -408,7 +408,7 @@ SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
     __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
 }
 
-/* Each group of four lanes of the four vectors forms a 4 × 4 matrix; transposes these matrices. */
+/* Transposes SIMD_WIDTH / 4 matrices of 4 × 4 numbers. Row i of matrix k consists of lanes 4 k to 4 k + 3 of v[i]. */
 SIMD_INLINE void vf_transpose(vf v[4])
 {
 #if defined(SIMD_AVX512)
@@ -572,7 +572,7 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #endif
 }
 
-/* Stores SIMD_WIDTH rows of four numbers, one from each vector. */
+/* Stores SIMD_WIDTH rows of four numbers. Row i consists of lane i of each of the four vectors. */
 SIMD_INLINE void vf_store_rows(float *to, const vf v[4])
 {
     vf rows[4] = {v[0], v[1], v[2], v[3]};

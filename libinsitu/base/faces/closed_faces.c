@@ -231,7 +231,8 @@ static bool ray_crosses_triangle_below(const double *const t[3], const double *p
 }
 
 /* Returns whether a connected piece of the surface is the boundary of a cavity, because it lies inside an odd number of
- * other pieces. The test ray starts at the piece's vertex of smallest x, so that it cannot cross the piece itself. */
+ * other pieces. The test ray starts at one vertex of the piece, the one with the smallest index. Triangles of the piece
+ * itself are not tested. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
     int smallest = c->vertex_count;

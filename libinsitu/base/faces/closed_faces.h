@@ -16,9 +16,11 @@
 typedef struct closed_triangle {
     int vertex[3]; /* indices of the triangle's vertices in the polyhedron, in increasing order */
     int face;
-    int orientation; /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
-    /* six times the volume of the tet of the triangle and the centre; after closed_faces_orient_outward(), positive
-     * if the outward normal points away from the centre */
+    /* 1 if the three vertices, in increasing order, run around the triangle in the direction that
+     * closed_faces_orient() has given to the face, else -1 */
+    int orientation;
+    /* set by closed_faces_orient_outward(): six times the volume of the tet between the triangle and the centre;
+     * negative if the outward normal points towards the centre */
     double volume;
 } closed_triangle;
 
@@ -38,8 +40,9 @@ typedef struct closed_faces {
     int *entry_vertices; /* for each entry, the index of its vertex in the polyhedron */
     int *face_of;        /* for each entry, the face to which it belongs */
     int64_t *vertices;   /* for each vertex of the polyhedron, its index in the grid */
-    /* -1 for faces that are reversed, otherwise 1; after closed_faces_orient_outward(), 1 if the face's vertices run
-     * around the outward normal */
+    /* for each face: -1 if its list of entries must be read in reverse to be consistent with the first face of its
+     * piece, otherwise 1. After closed_faces_orient_outward(): 1 if the list runs counterclockwise as seen from outside
+     * the cell, otherwise -1 */
     int *orientation;
     int *piece; /* for each face, the index of the connected piece of the surface to which it belongs */
     closed_triangle *triangles;

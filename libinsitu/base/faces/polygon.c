@@ -175,7 +175,7 @@ static bool are_coincident(const polygon_work *w, int a, int b)
 }
 
 /* The corners `again` and `tip` have the same position. Returns whether one of the two edges at `again` leads into the
- * angle at `tip` between the edges to its neighbours a and c. */
+ * angle between the two edges from `tip` to its neighbours a and c. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};
@@ -203,8 +203,8 @@ static bool is_ear(const polygon_work *w, int tip)
     return true;
 }
 
-/* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if there is
- * no ear. */
+/* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if there
+ * is no ear. */
 static int find_ear(const polygon_work *w, int first)
 {
     int i = first;

@@ -2,7 +2,7 @@
  *
  * The triangles depend only on the positions of the corners. Two cells that share a face therefore get the same
  * triangles, although their lists of the face's corners may begin at different corners and run in opposite directions.
- * The polygon is projected along its normal, which is the sum of its triangles' areas as vectors. The corners are
+ * The polygon is projected along its normal, which is the sum of the area vectors of a fan's triangles. The corners are
  * ordered from the smallest position (by x, then y, then z) in the direction in which the list of positions is
  * lexicographically smaller, which usually means towards the smaller neighbour. If all triangles of the fan from the
  * first corner have the polygon's orientation, the polygon is cut into this fan; this is the case for all convex
@@ -24,7 +24,7 @@ size_t polygon_work_bytes(int count);
 void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3]);
 
 /* Returns whether four corners form a quad with exactly one concave corner. A quad that crosses itself has no concave
- * corner. Only concave quads are not cut into a fan from the first corner. */
+ * corner. All quads except concave ones are cut into a fan from the first corner. */
 bool polygon_is_concave_quad(const double (*corners)[3]);
 
 #endif

@@ -146,7 +146,8 @@ enum {
     INSITU_CHANGED_TOPOLOGY = 1, /* the cells, their types and faces, or ghost flags; the bounding volume hierarchy (the
                                     tree) is built again */
     INSITU_CHANGED_GEOMETRY = 2, /* the coordinates; the tree's bounds are refitted */
-    /* a field's values; the tree's ranges are refitted if the values have actually changed */
+    /* a field's values; the ranges of values in the tree's nodes are computed again if the values have actually
+     * changed */
     INSITU_CHANGED_VALUES = 4,
     INSITU_CHANGED_ALL = 7
 };
@@ -493,8 +494,8 @@ typedef struct insitu_report {
      * reported at every step. The warnings are the same on every rank. */
     const char *warnings;
     /* "" or one line for each mesh with cells of higher order that an image shows: the number of pieces between two
-     * nodes, and the bound of their error. It is "" if the scene has finer_pieces. The same on every rank; valid until
-     * the next step */
+     * neighbouring nodes, and the bound of the pieces' error. It is "" if the scene has finer_pieces. The same on every
+     * rank; valid until the next step */
     const char *pieces;
 } insitu_report;
 
