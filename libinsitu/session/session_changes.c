@@ -3,7 +3,7 @@
  *
  *     - whether all ranks are at the same cycle (maximum and minimum), and the lowest rank with an error
  *     - whether cells, coordinates, levels of refinement or names have changed on any rank
- *     - whether all tables of names are equal
+ *     - whether all ranks have the same names of meshes and fields
  *     - whether any rank needs more threads, and the lowest instruction set
  *     - whether any field has a fill function, and the lowest rank that has a warning for all ranks
  *     - from rank 0: the time, whether the scene file was edited, whether pictures could not be written, and whether

@@ -34,7 +34,7 @@ static insitu_status read_file(const char *path, scene_file_text *text, base_err
     return INSITU_OK;
 }
 
-/* Reads a file that a scene names into memory. */
+/* Reads into memory a file that the scene names. */
 static insitu_status read_attachment(const char *path, char **text, int64_t *size, base_error *error)
 {
     scene_file_text file = {0};

@@ -32,7 +32,7 @@ typedef struct session_table {
 
 /* The tables of all databases, on rank 0. */
 typedef struct session_cinema {
-    bool has_begun;
+    bool has_begun;      /* set if first_cycle is valid */
     int64_t first_cycle; /* first cycle of the session, or first cycle since the scene was edited */
     int count;
     session_table *tables; /* one table per database of the scene; NULL before the first picture */

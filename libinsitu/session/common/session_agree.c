@@ -1,6 +1,6 @@
 /* A rank that returned early would leave the others blocked in their next collective call. Therefore, after each phase
- * of a step, either all ranks end the step, or no rank does. If no error occurred, this costs one reduction of an
- * integer. */
+ * of a step, either all ranks end the step, or no rank does. If no error occurred, the agreement costs one
+ * reduction of an integer. */
 #include "session_agree.h"
 
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /* OpenMP's runtimes end the process if they cannot start a thread. Threads are therefore first started here as a trial,
  * in which a failure only reduces their number. The trial starts the threads that the step needs and SPARE_THREADS
- * more, with the stack size that OpenMP would use. They exist until every rank has finished its trial, since the ranks
- * of a node share limits (processes of a user or a container, memory, address space). OpenMP then gets the number that
- * could be started. The spare threads, and some memory, remain available for other purposes.
+ * more, with the stack size that OpenMP would use. All of them exist until every rank has finished its trial, since the
+ * ranks of a node share limits (processes of a user or a container, memory, address space). OpenMP then gets the number
+ * that could be started. The spare threads, and some memory, remain available for other purposes.
  *
  * OpenMP keeps its threads for later regions. Therefore the trial is repeated only if more threads are needed, or if
  * threads have ended; GNU's OpenMP ends threads if a region of the caller uses fewer. A destructor in each thread
@@ -75,7 +75,7 @@ static void create_exit_key(void)
 }
 
 /* Returns the number of threads, including the caller, that exist for parallel regions of the calling thread. Returns 1
- * if another thread made the previous call or if threads have ended since, because the number is then unknown. */
+ * if another thread made the trial or if threads have ended since, because the number is then unknown. */
 static int count_living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
@@ -105,8 +105,8 @@ static void *wait_at_gate(void *gate)
     return NULL;
 }
 
-/* Parses a size in the format that the OpenMP runtimes use, as in "512k" or " 16 M". Returns the size in bytes, or 0 if
- * the text contains none. */
+/* Parses a size in the format that the OpenMP runtimes use, as in "512k" or " 16 M". unit: unit in bytes of a number
+ * without a suffix. Returns the size in bytes, or 0 if the text contains none. */
 static size_t parse_size(const char *text, size_t unit)
 {
     static const char suffixes[] = "bkmg";

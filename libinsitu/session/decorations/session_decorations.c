@@ -36,7 +36,7 @@ static void project_to_pixel(const render_camera *c, const seen_point *p, double
     pixel[1] = 0.5 * c->height - p->position[1] * scale;
 }
 
-/* Clips the edge at the plane with depth `near`. Returns false if the whole edge is nearer than that. */
+/* Clips the edge from a to b at the plane z = near (seen_point). Returns false if the whole edge is nearer. */
 static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 {
     if (a->position[2] < near && b->position[2] < near) return false;
@@ -89,8 +89,9 @@ typedef struct ruled_edge {
     double from[3], to[3]; /* the ends in scene coordinates */
     double pixels[2][2];   /* ends of the edge in pixels */
     double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
-    /* is_in_front: the edge lies in front of the eye; is_outer: the edge is on the box's silhouette, between a face
-     * whose outer side is seen and one whose inner side is seen */
+    /* is_in_front: the edge and the box's centre lie in front of the eye, and the edge is longer than a pixel;
+     * is_outer: the edge is on the box's silhouette, between a face whose outer side is seen and one whose inner side
+     * is seen */
     bool is_in_front, is_outer;
 } ruled_edge;
 
@@ -240,8 +241,8 @@ static bool add_scene_texts(session_decorations *d, const scene_decorations *sce
     return well;
 }
 
-/* Returns whether the layer shows the magnitude of the field: either the scene requests it, or the field has several
- * components. */
+/* Returns whether the layer shows the magnitude of the field: the scene requests it, or the scene requests neither it
+ * nor a component, and the field has several components. */
 static bool shows_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
     int components = 1;

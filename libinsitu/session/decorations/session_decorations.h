@@ -60,8 +60,8 @@ int session_compute_box_strokes(const double lower[3], const double upper[3], co
 void session_add_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                             insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 
-/* Returns a scale bar. Its length is a round number and at most a fifth of the picture's width, at the depth of the
- * point. unit may be NULL. Local. */
+/* Returns a scale bar. Its length is a round number of scene units that, at the distance of `point` along the camera's
+ * axis, appears as at most a fifth of the picture's width. unit may be NULL. Local. */
 insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit);
 
 #endif

@@ -21,8 +21,8 @@ static round_step next_step(round_step step)
     return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
 }
 
-/* Computes the first and the last multiple of the step in [low, high]. If a bound differs from a multiple only by
- * rounding, that multiple is included. */
+/* Computes the integers `first` and `last` such that first * step and last * step are the smallest and the largest
+ * multiple of the step in [low, high]. A multiple that differs from low or high only by rounding is included. */
 static void find_multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
@@ -172,8 +172,9 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_ticks_at_multiples(s, most, ticks) : count;
 }
 
-/* If the bands correspond to the integers in the range, adds one tick in the centre of each band. This is the case if
- * the range begins and ends at integers, or half a band beyond them. Returns the number of ticks; 0 if the bands do not
+/* If the bands correspond to the integers in the range, adds one tick in the centre of each band, or of every n-th band
+ * if there are many. The bands correspond to integers if the range begins and ends at integers, or half a band beyond
+ * them. Returns the number of ticks; 0 if the bands do not
  * correspond to integers. */
 static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
 {

@@ -16,10 +16,10 @@ typedef struct cell_corners {
     double volume_factor;
 } cell_corners;
 
-/* Constants of the first approximation of the cube root: a third of the upper bits of the double, plus an offset. Its
- * relative error is at most 0.033, because a double's bits are its logarithm to within 0.09. A step of Halley's method
- * cubes the error; after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the bits of
- * 1.0, less a correction for the mantissa. */
+/* Constants of the first approximation of the cube root: a third of the upper 32 bits of the double, plus an offset.
+ * Its relative error is at most 0.033, because a double's bits are its logarithm to within 0.09. A step of Halley's
+ * method cubes the error; after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the
+ * upper 32 bits of 1.0, less a correction for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
 static inline __attribute__((always_inline)) cell_corners find_cell_corners(int type)

@@ -13,8 +13,8 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* number of cells of a block; their volumes fit into the first-level cache */
-    PARTS = LANES / LANE_WIDTH,
+    BLOCK_CELLS = 512,          /* number of cells of a block; their volumes fit into the first-level cache */
+    PARTS = LANES / LANE_WIDTH, /* number of vectors that contain one number for each of LANES cells */
     AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
 
@@ -46,7 +46,7 @@ typedef struct lane_bounds {
 /* Results of one call of a lane_run function. Each lane of the vectors contains the results over the cells that this
  * lane has processed. */
 typedef struct lane_sizes {
-    doubles sums[PARTS];
+    doubles sums[PARTS];   /* sums of the cube roots of absolute volumes times the volume factor */
     doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */
     words inverted_counts; /* negated number of cells with a negative volume */
 } lane_sizes;
@@ -116,7 +116,8 @@ LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Returns whether all indices are valid. An index is valid if neither the index nor (last - index) is negative. */
+/* Returns whether all indices are valid. An index, counted from 0, is valid if neither the index nor (last - index) is
+ * negative. The sign bits of all these numbers are combined in `signs`. */
 LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;
