@@ -1,7 +1,7 @@
-/* Computes normals by central differences from the samples of all ranks. A rank samples its own cells at the six points
- * around each of its hits, and requests samples from every rank whose bounding box contains one of these points. A
- * request is the hit (16 bytes); its answer is the samples (32 bytes). If ranks have compact parts of the domain, only
- * hits near the faces between these parts cause requests.
+/* Computes the normals of hits, the points at which rays meet isosurfaces, by central differences of the field. A rank
+ * samples the field in its own cells at the six points around each of its hits, and requests samples from every rank
+ * whose bounding box contains one of these points. A request is the hit (16 bytes); its answer is the samples (32
+ * bytes). If ranks have compact parts of the domain, only hits near the faces between these parts cause requests.
  *
  *     rank A   hits -> own samples -> requests to ranks by their boxes ............ and all samples -> light
  *     rank B                          requests -> own samples -> answers

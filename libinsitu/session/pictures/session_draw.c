@@ -305,9 +305,9 @@ static insitu_status draw_frames_of_samples(frames_basis *b, const scene_image *
     return status;
 }
 
-/* Draws all frames of an image. If there are no volumes, one frame is drawn with rays through the pixels' centres, and
- * then several frames of only the pixels at edges. If there are volumes and depth is needed, a frame with rays through
- * the pixels' centres is drawn first, and only its depth is used. */
+/* Draws all frames of an image. If the image is antialiased and has no volumes, one frame is drawn with rays through
+ * the pixels' centres, and then several frames of only the pixels at edges. If it is antialiased, has volumes, and
+ * needs depth, a frame with rays through the pixels' centres is drawn first, and only its depth is used. */
 static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;

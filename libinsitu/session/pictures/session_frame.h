@@ -30,8 +30,8 @@ typedef struct session_frame_target {
     int64_t fragment_limit;
 } session_frame_target;
 
-/* Draws one frame of the job into out (comp.h). The jobs of the ranks may differ only in their meshes
- * (render_job.parts). Collective; returns the same status on all ranks. */
+/* Draws one frame of the job into the picture `out`, whose pixels are stored on rank 0 (comp_composite()). The jobs of
+ * the ranks may differ only in their meshes (render_job.parts). Collective; returns the same status on all ranks. */
 insitu_status session_draw_frame(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
                                  base_error *error);
 

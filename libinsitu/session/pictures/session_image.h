@@ -27,8 +27,8 @@ double session_load_image_library(void);
  * picture will fail anyway. Local. Thread-safe. */
 void session_find_text_faults(const insitu_image *image, insitu_word_faults *out);
 
-/* Set if pictures may be written by a separate thread (session_writer.h). Tests that replace this file set it to
- * false. */
+/* Set if pictures may be written by a separate thread (session_writer.h). Tests that replace session_image.c
+ * set it to false. */
 extern bool session_writes_behind;
 
 #endif

@@ -2,7 +2,7 @@
  * traces the hit's shadow and occlusion rays in its own cells, which block most of the rays. Then it sends requests to
  * the ranks whose bounding boxes are intersected by rays that are not blocked yet. A request consists of the hit and
  * the set of its unblocked rays, 32 bytes in all; the other rank computes the rays from the hit in the same way. The
- * answer is the set of rays that are still unblocked, 8 or 16 bytes.
+ * answer is the set of rays that are still unblocked (16 bytes).
  *
  *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ...... all answers -> colours
  *     rank B                                          requests -> own cells -> unblocked rays -> answers
@@ -32,7 +32,7 @@ typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
     int rank, ranks;
-    render_occluders *occluders; /* occluders of this rank */
+    render_occluders *occluders; /* this rank's opaque surfaces, which may block rays */
     int64_t round_hits;
     render_box *boxes; /* bounding box of each rank's cells */
     int64_t count;
@@ -154,7 +154,8 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the requests from the message, because the data in the message are not aligned for their types. */
+/* Copies the requests into an array of hits and an array of rays, because in the message each hit is followed by its
+ * rays. */
 static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / REQUEST_WORDS;
