@@ -232,8 +232,9 @@ static void add_volume(session_error_requests *requests, const session_due_views
     show_request(requests, views, &like, index);
 }
 
-/* Determines whether the image shows the mesh from all of its cells, and whether it shows its outer surface. With a
- * threshold, outer faces of the selected cells may lie anywhere in the mesh. */
+/* Sets needs_all if the image shows a volume of the mesh, and needs_outer if it shows the mesh's outer surface. If the
+ * outer surface has a threshold, needs_all is set too, because the outer faces of the selected cells may lie anywhere
+ * in the mesh. In each case the image also needs the request for positions. */
 static void add_whole_layers(session_error_requests *requests, const session_due_views *views,
                              const session_catalogue_mesh *mesh, int index)
 {

@@ -10,8 +10,8 @@
 /* The cameras of the due images. */
 typedef struct session_due_views {
     const scene *scene;
-    int count; /* number of images of the scene */
-    bool *are_due;
+    int count;              /* number of images of the scene */
+    bool *are_due;          /* for each image, whether it is due and its camera has a direction of view */
     render_camera *cameras; /* cameras of the images that are due */
     session_extent extent;  /* bounds of the caller's nodes; not computed if no due image needs them for a camera, a
                                slice or a volume */
@@ -28,9 +28,9 @@ void session_free_due_views(session_due_views *views);
  * cells. */
 typedef struct session_error_request {
     const session_due_views *views;
-    bool *images; /* one flag per image of the scene: set if the image shows what the request measures */
-    bool is_shown;
-    /* name of the field whose isosurfaces are measured; NULL: the request is for a plane or for positions */
+    bool *images;  /* one flag per image of the scene: set if the image shows what the request measures */
+    bool is_shown; /* set if a due image shows what the request measures; otherwise nothing is measured */
+    /* name of the field whose isosurfaces or volume are measured; NULL: the request is for a plane or for positions */
     const char *field;
     int component;
     int value_count;

@@ -241,7 +241,8 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the part at which the iterator is. This part must be a mesh of outer faces. */
+/* Returns whether the layer shows the part at which the walk is. This is true only of meshes of outer faces that were
+ * made for the layer's meshes and threshold. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_is_surface_on_mesh(layer, walk->whole) &&
@@ -366,7 +367,7 @@ static void warn_of_plane(const session_layer_basis *basis, const scene_image *i
                  image->name, low, high);
 }
 
-/* Sets up the surface layer of a plane of a slice. surface: the plane's index among the surfaces. */
+/* Computes the renderer's surface layer for one plane of a slice. surface: the plane's index among the surfaces. */
 static insitu_status fill_plane(const session_layer_basis *basis, const scene_image *image, const scene_slice *layer,
                                 const scene_plane *plane, int surface, session_layers *layers, base_error *error)
 {

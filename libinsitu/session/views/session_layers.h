@@ -39,8 +39,8 @@ typedef struct session_layer_basis {
     const session_catalogue *catalogue;
     const session_team *team;
     double half_diagonal; /* half the diagonal of the global bounds */
-    bool is_flat;         /* set if session_flat_axis() has found an axis */
-    bool has_shells;      /* result of session_has_shells() */
+    bool is_flat;         /* set if the data is flat (session_flat_axis()) */
+    bool has_shells;      /* set if any mesh contains only shells (session_has_shells()) */
     session_report *report;
     session_image_ranges *run_ranges; /* colour ranges over all steps so far; NULL: no layer has such a range */
     const scene_image *image;

@@ -32,7 +32,7 @@ static const double bytes_per_mib = 1048576;
 /* The errors of the linear pieces of one mesh, and the data from which its number of pieces between two nodes is
  * chosen. */
 typedef struct piece_error {
-    bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
+    bool needs_all; /* set if all cells are refined (session_error_requests); the same on every rank */
     bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
                        every rank */
     /* results of measuring all requests of the mesh, combined: the largest error, and the number of cells that
@@ -188,8 +188,9 @@ static void fill_fields(const session_pieces_basis *basis, const session_due_vie
     session_clear_requested_fields(basis->meshes);
 }
 
-/* Values of one mesh that are summed over the ranks. cell_count, unbounded_count and area are those of
- * session_deviation. */
+/* Values of one mesh that are summed over the ranks. cell_count: number of cells that isosurfaces may cross;
+ * unbounded_count: number of these cells whose bound was replaced by a limit; area: estimated area of the isosurfaces,
+ * in sixteenths of a pixel (session_deviation). */
 typedef struct piece_sums {
     int64_t cell_count, unbounded_count, area;
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];

@@ -16,10 +16,11 @@ typedef struct session_pieces_basis {
 } session_pieces_basis;
 
 /* Chooses the number of pieces between two nodes for each mesh. It is the scene's finer_pieces or, if this is 0, the
- * smallest number with which the error of all due images is at most the scene's surface_error. The numbers are reduced
- * if the pieces of all meshes would take more memory than the scene's finer_memory. Calls fill functions of fields that
- * isosurfaces and volumes show. Adds the chosen numbers to the report. choices: results of
- * session_count_higher_order_cells(), one per mesh of the catalogue. Collective; all ranks return the same status. */
+ * smallest number with which the errors of surfaces and of volumes in due images are at most the allowed errors, up to
+ * a maximum (find_pieces() in session_pieces.c). The numbers are reduced if the pieces of all meshes would take more
+ * memory than the scene's finer_memory. Calls fill functions of fields that isosurfaces and volumes show. Adds the
+ * chosen numbers to the report. choices: results of session_count_higher_order_cells(), one per mesh of the catalogue.
+ * Collective; all ranks return the same status. */
 insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
                                     session_report *report, base_error *error);
 

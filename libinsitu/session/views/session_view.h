@@ -13,7 +13,7 @@ typedef struct session_view {
     render_space space;
     render_light lights[RENDER_MAX_LIGHTS];
     render_occlusion occlusion; /* parameters of ambient occlusion and shadows */
-    double step;
+    double step;                /* distance between the samples of volumes, in scene units */
     int clip_count;
     render_clip clips[RENDER_MAX_CLIPS];
 } session_view;

@@ -18,8 +18,8 @@
  * with a large bracket are distributed evenly along the ray, the change of light is A (1 - exp(-D)) / D. The light
  * itself is computed from the integral of c s in the same way.
  *
- * The result is an estimate. It is too large because errors of opposite signs are added up, and too small because it is
- * a mean over the cells of the grid. */
+ * The result is an estimate. It may be too large, because errors of opposite signs are added up, or too small, because
+ * it is a mean over each cell of the grid. */
 #include "session_volume_errors.h"
 
 #include <math.h>
@@ -39,8 +39,8 @@ enum {
 };
 
 /* Sums are integers, in units of sum_unit. The contribution of a cell to a sum is limited to most_of_cell; a cell
- * above the limit is opaque, or its error exceeds any allowed error by far. The sum of 2^23 cells at the limit is
- * below 2^63. */
+ * above the limit is opaque, or its error exceeds any allowed error by far. The sum of fewer than 2^23 cells at
+ * the limit is below 2^63. */
 static const double sum_unit = 1.0 / (1 << 30), most_of_cell = 1024;
 /* Factor from the mean error in a cell of the grid to the error of the worst pixels in it. In the test
  * session_order_volumes, whose cells are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times
@@ -70,9 +70,9 @@ typedef struct volume_errors {
     double slopes[2][QUANTITIES];
     int view_count; /* number of due views that show the volume */
     int *views;
-    /* For each view and each cell of the grid over its picture, the integrals along rays, for one piece between two
-     * nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells or on the
-     * partition. */
+    /* For each view and each cell of the grid over its picture, the integrals of all quantities along rays, for one
+     * piece between two nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells
+     * or on the partition. */
     int64_t *sums;
     int64_t sum_count;
 } volume_errors;
@@ -308,13 +308,13 @@ static void find_light_per_length(const volume_errors *of, const session_value_c
 }
 
 /* The part of a grid over a picture that a cell of the mesh covers: a rectangle, in units of cells of the grid, and the
- * area of one cell of the grid at the depth of the mesh's cell. */
+ * area that one cell of the grid has at the mesh's cell, in scene units. */
 typedef struct covered_part {
     double low[2], high[2], area;
 } covered_part;
 
-/* Finds the part of the grid that a cell of the mesh covers. If the cell's depth is smaller than its radius, the depth
- * is replaced by the radius. Returns false if the cell is behind the eye. */
+/* Finds the part of the grid that a cell of the mesh covers. If the cell's distance from the eye along the camera's
+ * axis is smaller than its radius, it is replaced by the radius. Returns false if the cell is behind the eye. */
 static bool project_cell(const render_camera *camera, const session_value_cell *cell, covered_part *out)
 {
     const double half[2] = {camera->half_height * camera->width / camera->height, camera->half_height};
