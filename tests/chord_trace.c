@@ -50,7 +50,7 @@ static void chord_tet_interval(const kernel_packet *p, const kernel_cell *c, vm 
 {
     const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays, .u = p->u, .v = p->v};
     kernel_transformed_tets tet;
-    kernel_transform_single_tet(&tet, c, p->frame, p->tile, p->is_pencil);
+    kernel_transform_single_tet(&tet, c, p->frame, p->tile);
     for (int i = 0; i < 4; i++) tet.f[i] = vf_set(0);
     kernel_tet_rays_interval_in_one(&tet, &r, 0, p->is_pencil, false, out);
 }

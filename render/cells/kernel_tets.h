@@ -236,12 +236,14 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     kernel_tets_set_interval(ends, has_colour, out);
 }
 
-/* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_pencil: set if edge functions
+/* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_uniform: set if all rays have
+ * the tet in the given lane; otherwise each ray has that of its own lane (r->lane). is_pencil: set if edge functions
  * are computed from the edges' lines (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
-                                       bool is_pencil, bool has_colour, vm hit[4], kernel_interval *out)
+                                       bool is_uniform, int lane, bool is_pencil, bool has_colour, vm hit[4],
+                                       kernel_interval *out)
 {
-    const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
+    const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = is_uniform, .lane = lane};
     kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
 }
 
@@ -251,7 +253,7 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transfo
                                           bool has_colour, kernel_interval *out)
 {
     vm hit[4];
-    kernel_tet_rays_cross(transformed, r, true, has_colour, hit, out);
+    kernel_tet_rays_cross(transformed, r, false, 0, true, has_colour, hit, out);
 }
 
 /* Computes the intervals of rays that all have the tet in the given lane. is_pencil: set if edge functions are computed
@@ -259,9 +261,8 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transfo
 SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                                  int lane, bool is_pencil, bool has_colour, kernel_interval *out)
 {
-    const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = true, .lane = lane};
     vm hit[4];
-    kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
+    kernel_tet_rays_cross(transformed, r, true, lane, is_pencil, has_colour, hit, out);
 }
 
 #endif

@@ -89,21 +89,19 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     }
 }
 
-/* Transforms tets whose vertices are sorted by coordinates. is_pencil: set if the lines of the tets' edges are
- * computed, too; only rays with kernel_packet.is_pencil use them. */
+/* Transforms tets whose vertices are sorted by coordinates, and computes the lines of their edges. */
 static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transformed_tets *out, const kernel_frame *f,
-                                                                   const kernel_tile *tile, bool is_pencil)
+                                                                   const kernel_tile *tile)
 {
     kernel_transformed_positions(out, f, tile);
-    if (is_pencil) kernel_transformed_lines(out, f, tile);
+    kernel_transformed_lines(out, f, tile);
 }
 
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
- * lanes get the vertices of the first tet. If values belong to cells, they are not read. is_pencil: set if the lines of
- * the tets' edges are computed. */
+ * lanes get the vertices of the first tet. If values belong to cells, they are not read. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
-                                                            int32_t vertices[4][SIMD_WIDTH], int count, bool is_pencil)
+                                                            int32_t vertices[4][SIMD_WIDTH], int count)
 {
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
@@ -111,7 +109,7 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
         kernel_transformed_sort(out, p, true, vertices);
     else
         kernel_transformed_sort(out, p, false, vertices);
-    kernel_transform_sorted_tets(out, f, tile, is_pencil);
+    kernel_transform_sorted_tets(out, f, tile);
 }
 
 /* Sets all lanes to a tet in tile space, without edge functions. */
@@ -124,18 +122,17 @@ SIMD_INLINE void kernel_transformed_tets_set(kernel_transformed_tets *out, const
     }
 }
 
-/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. is_pencil: set if the
- * lines of its edges are computed. */
+/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. */
 static __attribute__((noinline, unused)) void kernel_transform_single_tet(kernel_transformed_tets *out,
                                                                           const kernel_cell *c, const kernel_frame *f,
-                                                                          const kernel_tile *tile, bool is_pencil)
+                                                                          const kernel_tile *tile)
 {
     for (int i = 0; i < 4; i++)
         for (int half = 0; half < 2; half++) {
             out->values[i][half] = c->values[i] - (kernel_f64){0};
             for (int a = 0; a < 3; a++) out->world[i][a][half] = c->world[i][a] - (kernel_f64){0};
         }
-    kernel_transform_sorted_tets(out, f, tile, is_pencil);
+    kernel_transform_sorted_tets(out, f, tile);
 }
 
 #endif

@@ -296,8 +296,8 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, 
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
     const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
     if (h->list->is_double || t0 < t1)
-        kernel_segments_add(h->list, h->list->is_double, vi_set(lane), vm_from_bits(1u << lane), vf_set(t0), vf_set(t1),
-                            &run);
+        kernel_segments_add(h->list, false, h->list->is_double, vi_set(lane), vm_from_bits(1u << lane), vf_set(t0),
+                            vf_set(t1), &run);
 }
 
 /* ---- bisection of an interval ---- */

@@ -19,6 +19,7 @@
 #include "kernel_visible_values.h"
 #include "kernel_local.h"
 #include "kernel_map.h"
+#include "kernel_tet_blocks.h"
 #include "kernel_transformed_curved.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_tile.h"
@@ -78,6 +79,7 @@ typedef struct kernel_tile_cells {
     kernel_map map;                    /* inverse map of `cell` */
     const kernel_map *cell_map;        /* points to `map`; NULL if the field of `cell` is constant */
     kernel_transformed_tets tets;      /* the vector of tets that is being processed */
+    kernel_block_rays block_rays;      /* the rays of the tile's blocks */
     kernel_tet_pairs tet_pairs;        /* pairs of a ray and one of `tets` */
     const kernel_local_queue *current; /* queue from which the cells in `curved` come */
     /* the current vector of hexes, wedges or pyramids in tile space; affine edge functions are not set */

@@ -113,7 +113,7 @@ static __attribute__((noinline)) void kernel_linear_segments(const kernel_tile_t
         const vf to = vf_min(end, kernel_local_next_cut(t, s, places, open, from));
         const kernel_unit_segment part =
             kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
-        kernel_segments_add(s->packets, s->is_double, places, vm_and(open, vf_le(begin, from)), from, to, &part);
+        kernel_segments_add(s->packets, false, s->is_double, places, vm_and(open, vf_le(begin, from)), from, to, &part);
         from = to;
     }
 }
@@ -128,7 +128,7 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
     vf length = vf_set(0);
     if (b->is_double) length = (t_out - t_in) * vf_gather(b->per_t, places);
     const kernel_unit_segment run = kernel_unit_segment_of(length, v_in, v_out);
-    kernel_segments_add(b->packets, b->is_double, places, rays, t_in, t_out, &run);
+    kernel_segments_add(b->packets, false, b->is_double, places, rays, t_in, t_out, &run);
 }
 
 /* The following two functions evaluate the polynomial (1/4 - u^2) (f[0] + f[1] u + f[2] u^2), which is 0 at the
@@ -195,8 +195,8 @@ static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places
                                                  const vf reach[2], float share);
 
 /* Adds the segments of the rays' intervals. An interval is halved, and its parts again, until the error bounds allow a
- * part to be divided into a few equal segments (kernel_local_count()). The shortest parts for which they do not allow
- * it are passed on: from vectors of cells to packets, and from packets to bisection in double. */
+ * part to be divided into a few equal segments (kernel_local_count()). The shortest parts for which
+ * they do not allow it are passed on: from vectors of cells to packets, and from packets to bisection in double. */
 SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
                                                const kernel_local_chord *chord, const kernel_local_pairs *whole,
                                                vm rays, int type)

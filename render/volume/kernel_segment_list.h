@@ -168,22 +168,23 @@ SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const f
 }
 
 /* Adds one segment per lane, from t_in to t_out, to the list of the lane's ray, unless the ray's window ends in front
- * of t_in. Segments must not begin in front of the rays' windows. places: position of each ray among the tile's packets
- * (packet * SIMD_WIDTH + lane), whose lists begin at `packets`; rays: mask of the lanes that have a segment; run:
- * values at the segments' ends. run->length is used only if the lists are in double. */
-SIMD_INLINE void kernel_segments_add(kernel_segments *packets, bool is_double, vi places, vm rays, vf t_in, vf t_out,
-                                     const kernel_unit_segment *run)
+ * of t_in. Segments must not begin in front of the rays' windows. If is_uniform is set, the rays are those of one
+ * packet, whose lists are *packets, and `places` is not used. Otherwise `places` has the position of each ray among the
+ * tile's packets (packet * SIMD_WIDTH + lane), whose lists begin at `packets`. rays: mask of the lanes that have a
+ * segment; run: values at the segments' ends. run->length is used only if the lists are in double. */
+SIMD_INLINE void kernel_segments_add(kernel_segments *packets, bool is_uniform, bool is_double, vi places, vm rays,
+                                     vf t_in, vf t_out, const kernel_unit_segment *run)
 {
     int32_t at[SIMD_WIDTH];
     float all[SIMD_WIDTH][4], doubles[SIMD_WIDTH][4];
-    vi_store(at, places);
+    if (!is_uniform) vi_store(at, places);
     const vf ends[4] = {t_in, t_out, run->v_in, run->v_out};
     const vf precise[4] = {run->length, run->rest_in, run->rest_out, vf_set(0)};
     vf_store_rows(all[0], ends);
     if (is_double) vf_store_rows(doubles[0], precise);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits), lane = at[i] % SIMD_WIDTH;
-        kernel_segments *list = &packets[at[i] / SIMD_WIDTH];
+        const int i = __builtin_ctz(bits), lane = is_uniform ? i : at[i] % SIMD_WIDTH;
+        kernel_segments *list = is_uniform ? packets : &packets[at[i] / SIMD_WIDTH];
         if (!(all[i][0] < list->t_end[lane])) continue;
         if (__builtin_expect(kernel_segments_insert(list, lane, all[i], doubles[i]), 1)) continue;
         const float length = is_double ? run->length[i] : (t_out[i] - t_in[i]) * list->per_t[lane];
@@ -320,8 +321,8 @@ SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit
  * kernel_integrate() stops once all light but KERNEL_BLACK is absorbed, so that the depth of a very dense fragment
  * would be too small. Therefore such a fragment is bisected until its parts are less dense. Emission ends when no light
  * is left. */
-static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays, vf t_in, vf t_out,
-                                const kernel_unit_segment *whole)
+static __attribute__((noinline)) void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays,
+                                                          vf t_in, vf t_out, const kernel_unit_segment *whole)
 {
     const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_mixed_share(list, whole);
     vf from = vf_set(0), to = kernel_mixed_part_end(list->pieces, whole, share, from), depth = vf_set(0);

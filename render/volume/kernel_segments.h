@@ -106,8 +106,8 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
     kernel_blend *b = &list->blend;
     vf begins[KERNEL_WINDOW];
     vi items[KERNEL_WINDOW];
-    kernel_preint_end end;
-    end.value = vf_set(NAN);
+    kernel_preint_end ends[2];
+    ends[0].value = vf_set(NAN);
     const int row_count = kernel_segments_sort(list, begins, items);
     for (int n = 0; n < row_count; n++) {
         const vf t_in = begins[n];
@@ -131,7 +131,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
             continue;
         }
         if (pieces->preintegral)
-            light = kernel_preintegrated(pieces, has, &run, &end);
+            light = kernel_preintegrated(pieces, has, &run, &ends[n & 1], &ends[~n & 1]);
         else
             kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, list, t_in, t_out)));

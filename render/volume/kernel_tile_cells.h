@@ -24,6 +24,7 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
+#include "kernel_tet_blocks.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
@@ -40,8 +41,8 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
-    /* set if edge functions on the packets' rays are computed from lines (kernel_packet.is_pencil), which must then be
-     * computed for each cell */
+    /* set if edge functions of hexes, wedges and pyramids on the packets' rays are computed from lines
+     * (kernel_packet.is_pencil), which must then be computed for each cell */
     bool is_pencil;
     /* Processes a cell with the rays of the packet with this index: the polyhedron c or, if c is NULL, the tile's
      * current cell (kernel_tile_cells.cell), a hex, wedge or pyramid. */
@@ -144,7 +145,7 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     kernel_local_read_indices(arrays, q, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
     for (int n = count; n < SIMD_WIDTH; n++) q->cell[n] = q->cell[0];
-    kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count, cells->method->is_pencil);
+    kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count);
     if (arrays->is_by_cell) kernel_transformed_set_cell_values(&cells->tets, arrays, q->cell);
     kernel_transformed_set_domain(&cells->tets, transfer);
     unsigned candidates =
@@ -188,8 +189,9 @@ static void kernel_tet_pairs_begin(const kernel_tile_trace *t, unsigned lanes, c
             kernel_pixel_list_add_box(&cells->rays, box, n);
             continue;
         }
-        pairs->large |= 1u << n;
-        pairs->blocks[n] = (uint16_t)(blocks[n] & kernel_box_blocks(box));
+        pairs->blocks[n] =
+            (uint16_t)(blocks[n] & kernel_box_blocks(box) & kernel_tet_blocks(&cells->block_rays, &cells->tets, n));
+        if (pairs->blocks[n]) pairs->large |= 1u << n;
     }
     kernel_pixel_list_pad(&cells->rays);
 }
@@ -234,7 +236,7 @@ static __attribute__((noinline, cold)) void kernel_tile_process_single_tet(kerne
                                                                            kernel_tile_cells *cells, unsigned blocks)
 {
     const uint16_t own_blocks = (uint16_t)blocks, box = (uint16_t)kernel_blocks_box(blocks);
-    kernel_transform_single_tet(&cells->tets, &cells->cell, t->frame, &t->tile, cells->method->is_pencil);
+    kernel_transform_single_tet(&cells->tets, &cells->cell, t->frame, &t->tile);
     kernel_transformed_set_domain(&cells->tets, &t->frame->volumes[cells->volume]);
     kernel_tet_pairs_begin(t, 1, &own_blocks, &box);
     cells->method->process_tets(t);
@@ -607,7 +609,7 @@ SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace
 }
 
 /* Sets up the packets of the given blocks for tracing volumes, and stores their indices in `packets`. Returns their
- * number. */
+ * number. Also computes the rays of the tile's blocks, for which the tile's rays must be known. */
 SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
 {
     int count = 0;
@@ -621,6 +623,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
             packets[count++] = i;
         }
     }
+    if (count) kernel_block_rays_begin(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
     return count;
 }
 

@@ -89,18 +89,28 @@ static __attribute__((noinline)) void kernel_tet_segments_refine(const kernel_ti
     run->length *= vf_gather(s->per_t, places);
 }
 
-/* Adds the segments of a vector of rays in their tets. */
-SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *s, kernel_lane_rays *r)
+/* Adds the segments of a vector of rays in their tets. is_uniform: set if the rays are those of one packet and share
+ * one tet, the current packet and lane of kernel_tet_pairs. */
+SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *s, kernel_lane_rays *r,
+                                           bool is_uniform)
 {
+    const kernel_tet_pairs *pairs = &t->thread->tile_cells->tet_pairs;
+    kernel_segments *lists = is_uniform ? &s->packets[pairs->packet] : s->packets;
     const vi places = r->at;
     kernel_interval i;
     vf begin, end, near, far;
     vm hit[4];
-    vf_gather_pair(s->window, 2 * places, &begin, &end);
+    if (is_uniform)
+        begin = lists->t_begin, end = lists->t_end;
+    else
+        vf_gather_pair(s->window, 2 * places, &begin, &end);
     r->active = vm_and(r->active, vf_lt(begin, end));
-    kernel_tet_rays_cross(&t->thread->tile_cells->tets, r, false, false, hit, &i);
+    kernel_tet_rays_cross(&t->thread->tile_cells->tets, r, is_uniform, pairs->lane, false, false, hit, &i);
     if (!vm_any(i.mask)) return;
-    vf_gather_pair(s->reach, 2 * places, &near, &far);
+    if (is_uniform)
+        near = t->packets[pairs->packet].t_near, far = lists->t_cut;
+    else
+        vf_gather_pair(s->reach, 2 * places, &near, &far);
     const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
     vm cut = vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out));
     if (s->has_cuts) cut = vm_or(cut, vf_lt(kernel_local_next_cut(t, s, places, met, i.t_in), i.t_out));
@@ -112,8 +122,8 @@ SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_seg
         kernel_tet_segments_refine(s, places, r->lane, kernel_tets_first_face(hit), kernel_tets_second_face(hit), &run);
     /* segments are kept if their length is positive, not if t_in < t_out, because in double the length may be positive
      * although both depths are the same float32 */
-    kernel_segments_add(s->packets, s->is_double, places, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out,
-                        &run);
+    kernel_segments_add(lists, is_uniform, s->is_double, places, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in,
+                        i.t_out, &run);
     if (__builtin_expect(vm_any(cut), 0)) kernel_linear_segments(t, s, places, cut, &i, (const vf[2]){near, far}, &run);
 }
 
@@ -125,7 +135,12 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_tile_trace *t)
     if (s->is_double)
         kernel_double_compute_faces(t->frame, &t->tile, &t->thread->tile_cells->tets, &t->frame->volumes[s->volume],
                                     s->faces);
-    while (kernel_tet_pairs_next(t, &r)) kernel_tet_segments_lanes(t, s, &r);
+    while (kernel_tet_pairs_next(t, &r)) {
+        if (t->thread->tile_cells->tet_pairs.packet < 0)
+            kernel_tet_segments_lanes(t, s, &r, false);
+        else
+            kernel_tet_segments_lanes(t, s, &r, true);
+    }
     kernel_blocks_shorten(t, s->blocks);
 }
 
