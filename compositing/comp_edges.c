@@ -31,8 +31,8 @@ static void mark_pixel(unsigned char *pixel, bool is_shared)
     }
 }
 
-static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned char *own, bool is_own_shared,
-                       unsigned char *other, bool is_other_shared)
+static void mark_differing_pixel_pairs(const unsigned char *differ, int64_t pixels, unsigned char *own,
+                                       bool is_own_shared, unsigned char *other, bool is_other_shared)
 {
     for (int64_t p = 0; p < pixels; p++) {
         uint32_t channels;
@@ -52,14 +52,14 @@ static void mark_row(const image *picture, int64_t y, unsigned char *differ, uns
     unsigned char *own = marks + width * y, *below = own + width;
     const bool is_shared = y % ROWS == 0, is_next_shared = (y + 1) % ROWS == 0;
     compare_rows(row, row + 4, width - 1, differ);
-    mark_pairs(differ, width - 1, own, is_shared, own + 1, is_shared);
+    mark_differing_pixel_pairs(differ, width - 1, own, is_shared, own + 1, is_shared);
     if (y + 1 == picture->height) return;
     compare_rows(row, next, width, differ);
-    mark_pairs(differ, width, own, is_shared, below, is_next_shared);
+    mark_differing_pixel_pairs(differ, width, own, is_shared, below, is_next_shared);
     compare_rows(row + 4, next, width - 1, differ);
-    mark_pairs(differ, width - 1, own + 1, is_shared, below, is_next_shared);
+    mark_differing_pixel_pairs(differ, width - 1, own + 1, is_shared, below, is_next_shared);
     compare_rows(row, next + 4, width - 1, differ);
-    mark_pairs(differ, width - 1, own, is_shared, below + 1, is_next_shared);
+    mark_differing_pixel_pairs(differ, width - 1, own, is_shared, below + 1, is_next_shared);
 }
 
 bool comp_find_edges(const image *picture, int threads, unsigned char *pixels)

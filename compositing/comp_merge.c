@@ -218,7 +218,7 @@ static void swap_fragments(fragment *items, int64_t a, int64_t b)
 
 /* Moves the intervals that end behind t = `depth` to the front of the list, without changing their order. Returns the
  * number of these intervals. */
-static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
+static int64_t move_unfinished_intervals_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
     for (int64_t i = 0; i < count; i++)
@@ -236,7 +236,7 @@ static float find_next_interval_end(const fragment *items, int64_t count)
 
 /* Returns whether the second fragment of the sorted list begins before the first one ends. `count` is the length of the
  * list. */
-static bool is_overlapped(const fragment *sorted, int64_t count)
+static bool overlaps_next_fragment(const fragment *sorted, int64_t count)
 {
     return count > 1 && is_volume_of_positive_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
@@ -288,7 +288,7 @@ static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, cons
                 if (sink->callback) sink->callback(sink->state, &sorted[end]);
             }
         }
-        open = move_open_to_front(sorted, open, at);
+        open = move_unfinished_intervals_to_front(sorted, open, at);
         if (open == 0 || b->transmittance == 0) break;
         float to = find_next_interval_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
@@ -317,7 +317,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
-        if (is_overlapped(items + i, count - i)) {
+        if (overlaps_next_fragment(items + i, count - i)) {
             blend run = {{0, 0, 0}, 1};
             n = blend_overlapping(&run, items + i, count - i, &no_sink);
             for (int c = 0; c < 3; c++) colour[c] += transmittance * (float)run.colour[c];
@@ -384,7 +384,7 @@ void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callbac
     const interval_sink sink = {callback, state};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
-        if (is_overlapped(sorted + i, count - i)) {
+        if (overlaps_next_fragment(sorted + i, count - i)) {
             blend run = {{0, 0, 0}, 1};
             n = blend_overlapping(&run, sorted + i, count - i, &sink);
             transmittance *= (float)run.transmittance;

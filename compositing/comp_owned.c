@@ -64,7 +64,7 @@ static bool add_remaining_fragment(merge_scratch *m, const fragment *item, uint3
 
 /* Adds a fragment for a pixel for which the sheet m->joined already contains one. If both are hits of opaque surfaces,
  * the sheet keeps the nearer one. Otherwise the pixel becomes mixed. */
-static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
+static bool join_with_earlier_fragment(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
     if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return add_remaining_fragment(m, item, at);
@@ -83,7 +83,7 @@ static bool join_own_fragments(const comp_strips *own, uint32_t strip, merge_scr
             __builtin_prefetch(item + AHEAD);
             if (!comp_sheet_has(&m->joined, at))
                 comp_sheet_put(&m->joined, at, item);
-            else if (!join_second(m, item, at))
+            else if (!join_with_earlier_fragment(m, item, at))
                 return false;
         }
     }
@@ -164,7 +164,8 @@ static void store_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel
     for (int w = 0; w < COMP_PIXEL_WORDS; w++) pixels->words[w][at] = words[w];
 }
 
-static void blend_listed(const comp_grid *grid, const comp_merge_output *merged, merge_scratch *m)
+static void blend_pixels_with_several_fragments(const comp_grid *grid, const comp_merge_output *merged,
+                                                merge_scratch *m)
 {
     for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
@@ -193,7 +194,7 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
     comp_sheet_finish(&m->joined, merged->background, &m->pixels);
     if (merged->deep) mark_all_mixed(m);
     if (!list_mixed_pixels(m)) return false;
-    blend_listed(owned->traced_strips->grid, merged, m);
+    blend_pixels_with_several_fragments(owned->traced_strips->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
     comp_sheet_store(&m->pixels, owned->traced_strips->grid, merged->background, merged->out);
     return true;

@@ -65,7 +65,7 @@ static bool cell_range(const check_state *w, int64_t cell, double *low, double *
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
     int64_t vertex;
-    if (!grid_has_own_value(w->field, cell)) return false;
+    if (!grid_has_finite_cell_value(w->field, cell)) return false;
     *low = INFINITY;
     *high = -INFINITY;
     while (grid_walk_next(&vertices, &vertex)) {

@@ -33,7 +33,7 @@ static double sum_areas_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
     return sum;
 }
 
-double cost_area_of_tree(const mmbvh *tree, int threads)
+double compute_area_sum_of_tree(const mmbvh *tree, int threads)
 {
     double sums[PARTS], area = 0;
 #pragma omp parallel num_threads(threads)
@@ -52,7 +52,7 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
 
 /* If the root's surface area is 0, no probability can be computed from areas. The cost is then that of a ray that hits
  * every node. */
-double cost_of_area(const mmbvh *tree, double area)
+double compute_cost_from_area_sum(const mmbvh *tree, double area)
 {
     if (!tree->node_count) return 0;
     float lower[4], upper[4];
@@ -70,5 +70,5 @@ double cost_of_area(const mmbvh *tree, double area)
 
 double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options)
 {
-    return cost_of_area(tree, cost_area_of_tree(tree, sweep_threads(options)));
+    return compute_cost_from_area_sum(tree, compute_area_sum_of_tree(tree, sweep_threads(options)));
 }

@@ -9,9 +9,9 @@ double cost_half_area(const float lower[3], const float upper[3]);
 
 /* Computes the value of mmbvh.area, which mmbvh.h defines, for the whole tree. The rounding does not depend on the
  * number of threads. */
-double cost_area_of_tree(const mmbvh *tree, int threads);
+double compute_area_sum_of_tree(const mmbvh *tree, int threads);
 
-/* Returns the tree's SAH cost (mmbvh_cost()), given the value of cost_area_of_tree(). */
-double cost_of_area(const mmbvh *tree, double area);
+/* Returns the tree's SAH cost (mmbvh_cost()), given the value of compute_area_sum_of_tree(). */
+double compute_cost_from_area_sum(const mmbvh *tree, double area);
 
 #endif

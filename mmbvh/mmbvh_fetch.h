@@ -194,7 +194,7 @@ static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *
     fetch_range range = numbers == FETCH_FLOATS    ? fetch_vertex_range(g, field, cell, FETCH_FLOATS)
                         : numbers == FETCH_DOUBLES ? fetch_vertex_range(g, field, cell, FETCH_DOUBLES)
                                                    : fetch_vertex_range(g, field, cell, FETCH_ANY_NUMBERS);
-    range.is_finite = range.is_finite && grid_has_own_value(field, cell);
+    range.is_finite = range.is_finite && grid_has_finite_cell_value(field, cell);
     return range;
 }
 

@@ -90,7 +90,7 @@ static inline lanes item_extent(lanes box)
 /* Returns half the surface area as two summands, xy + yz and zx, for two boxes whose extents are in lanes 0 to 2 and in
  * lanes 4 to 6. Lanes 0 and 1 of the result belong to the first box, lanes 2 and 3 to the second one. Lanes 3 and 7 of
  * the extents are ignored. */
-static inline ivec4 item_area_terms(lanes extents)
+static inline ivec4 item_half_area_summands(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);
     return lanes_multiply_add(extents, turned & (lanes){-1, -1, -1, 0, -1, -1, -1, 0});
@@ -99,7 +99,7 @@ static inline ivec4 item_area_terms(lanes extents)
 /* Returns half the surface area of a box, in squared steps. */
 static inline float item_half_area(lanes box)
 {
-    const vec4 terms = vec4_from_int(item_area_terms(item_extent(box)));
+    const vec4 terms = vec4_from_int(item_half_area_summands(item_extent(box)));
     return terms[0] + terms[1];
 }
 

@@ -96,7 +96,7 @@ static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, in
     /* areas are not measured, because the nodes' boxes are still in steps of the old grid */
     const sweep all = sweep_of_bounds(tree, source);
     if (sweep_tree(&all, threads).count) return INSITU_ERROR_MESH;
-    tree->area = cost_area_of_tree(tree, threads);
+    tree->area = compute_area_sum_of_tree(tree, threads);
     return INSITU_OK;
 }
 

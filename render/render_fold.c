@@ -102,7 +102,7 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
         const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
         shorten(folding, run + i, made);
         for (int64_t k = i; k < i + made; k++)
-            if (fragment_shows(&run[k])) *out++ = run[k];
+            if (fragment_changes_picture(&run[k])) *out++ = run[k];
     }
     return out;
 }

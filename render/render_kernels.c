@@ -30,7 +30,7 @@
 
 /* Sorts candidates by mesh part; within a part they stay in order of depth. Cells are traced in batches (up to
  * SIMD_WIDTH cells, kernel_batch.h) of one part only, and without sorting, cells of different parts would alternate. */
-static void kernel_prefetched_sort(const kernel_tile_candidate **items, int count)
+static void kernel_sort_candidates_by_part(const kernel_tile_candidate **items, int count)
 {
     for (int n = 1; n < count; n++) {
         const kernel_tile_candidate *item = items[n];
@@ -45,7 +45,7 @@ static void kernel_prefetched_sort(const kernel_tile_candidate **items, int coun
 static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
-    kernel_prefetched_sort(items, m->prefetched_count);
+    kernel_sort_candidates_by_part(items, m->prefetched_count);
     for (int n = 0; n < m->prefetched_count; n++) {
         int part;
         const int value = kernel_tile_set_source(t, items[n]->source, &part);

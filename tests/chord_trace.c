@@ -42,7 +42,8 @@ static void chord_trace_polyhedron(kernel_packet *p, const chord_state *state, c
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r)) chord_store_intervals(state, r.interval.mask, r.interval.t_in, r.interval.t_out);
+    while (kernel_poly_find_next_interval(&r))
+        chord_store_intervals(state, r.interval.mask, r.interval.t_in, r.interval.t_out);
 }
 
 /* Computes the interval of the rays in a tet, which has been read and sorted. */

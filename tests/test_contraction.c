@@ -173,7 +173,7 @@ static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds
     kernel_bounds_of(b->type, (const float(*)[8][SIMD_WIDTH])b->at, &b->beam, bounds);
     kernel_contraction_set_ray(&cells, &b->rays, lanes, &c);
     kernel_contraction_set_cell(bounds, lanes, b->type, &c);
-    KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
+    KERNEL_OF_TYPE(b->type, kernel_find_only_root_by_contraction, &c, vm_all_lanes(), out, none);
     kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
     out->t += vf_load(b->at[2][0]);
     kernel_refine_accurate_roots(&b->rays, &map, out->mask, out);

@@ -162,7 +162,7 @@ static void choose_point_in_piece(int type, double out[3])
 /* Computes the weights with which a piece interpolates between its corners. */
 static void compute_corner_weights(int type, const double at[3], double weights[8])
 {
-    const session_shape *shape = session_shape_of(type);
+    const session_shape *shape = session_get_cell_shape(type);
     for (int c = 0; c < 8; c++) {
         const signed char *corner = shape->corners[c];
         weights[c] = 1;

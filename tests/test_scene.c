@@ -363,8 +363,9 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_int_equal(second->colour_by.component, 2);
     assert_int_equal(second->colour_by.line, 36);
     assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
-    assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
-    assert_true(scene_field_is_on(&first->field, "anything"));
+    assert_true(scene_field_selects_mesh(&second->colour_by, "air") &&
+                !scene_field_selects_mesh(&second->colour_by, "sea"));
+    assert_true(scene_field_selects_mesh(&first->field, "anything"));
     assert_true(first->field.at_vertices && second->field.at_vertices && second->colour_by.at_vertices);
     check_built_in_colour_map(&second->colour_map, "inferno");
     assert_true(second->colour_map.range.is_fixed);
@@ -389,8 +390,9 @@ static void scene_volume_keys_are_read(void **state)
     assert_true(volume->unit_distance == 0.1);
     assert_true(volume->field.at_vertices && !s.images[1].volumes[0].field.at_vertices);
     assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
-    assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
-    assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
+    assert_true(scene_field_selects_mesh(&volume->field, "air") &&
+                scene_field_selects_mesh(&volume->field, "sea/12/3"));
+    assert_false(scene_field_selects_mesh(&volume->field, "se") || scene_field_selects_mesh(&volume->field, "sea2"));
     assert_int_equal(volume->opacity_count, 4);
     for (int i = 0; i < 4; i++)
         assert_true(volume->opacity[i].position == at[i] && volume->opacity[i].opacity == opacity[i]);
@@ -611,10 +613,10 @@ static void surface_colours_are_read(void **state)
                  convert_srgb_to_linear(1));
     check_colour(surface[1].edge_colour, convert_srgb_to_linear(0.1), convert_srgb_to_linear(0.1),
                  convert_srgb_to_linear(0.1));
-    assert_true(surface[0].meshes_field.mesh_count == 2 && scene_field_is_on(&surface[0].meshes_field, "sea/3"));
-    assert_false(scene_field_is_on(&surface[0].meshes_field, "seaside"));
+    assert_true(surface[0].meshes_field.mesh_count == 2 && scene_field_selects_mesh(&surface[0].meshes_field, "sea/3"));
+    assert_false(scene_field_selects_mesh(&surface[0].meshes_field, "seaside"));
     assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
-    assert_true(scene_field_is_on(&surface[1].meshes_field, "any"));
+    assert_true(scene_field_selects_mesh(&surface[1].meshes_field, "any"));
     assert_string_equal(surface[1].colour_by.name, "q");
     check_built_in_colour_map(&surface[1].colour_map, "grey");
     check_colour(surface[1].colour, convert_srgb_to_linear(0.8), convert_srgb_to_linear(0.8),

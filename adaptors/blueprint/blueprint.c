@@ -216,8 +216,8 @@ static bool set_mesh_and_fields(insitu_blueprint *adaptor, const node *domain, c
 /* Passes the mesh `name`, or the block `number` of this mesh, to the session. The blocks of a mesh must have the same
  * fields. A block with other fields than the blocks before it becomes a mesh of its own, and the block's number is
  * added to the name. */
-static bool pass_block(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
-                       const char *name, int64_t number)
+static bool set_mesh_or_block(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
+                              const char *name, int64_t number)
 {
     char own_name[NODE_PATH + 32];
     const uint64_t fields_hash = blueprint_hash_fields(domain, topology->name, mesh);
@@ -236,7 +236,7 @@ static bool set_topology(insitu_blueprint *adaptor, const node *domain, const no
     bool is_read = blueprint_read_topology(domain, topology, &mesh);
     if (is_read && !mesh.is_left_out) is_read = blueprint_read_ghosts(domain, topology->name, &mesh);
     if (is_read && !mesh.is_left_out)
-        is_read = pass_block(adaptor, domain, topology, &mesh, name, number);
+        is_read = set_mesh_or_block(adaptor, domain, topology, &mesh, name, number);
     else
         owned_arrays_free(&mesh.owned);
     blueprint_mesh_free_tables(&mesh);

@@ -155,7 +155,7 @@ void add_point_fields(vtkDataSet *grid, const std::string &what, conversion_log 
         if (!is_field(array, grid->GetNumberOfPoints(), what, log)) continue;
         const std::string field = what + " field '" + array->GetName() + "'";
         p.held.objects.emplace_back(array);
-        add_field(array->GetName(), INSITU_VERTEX, view_array(array, field, p.held, log), p);
+        add_field(array->GetName(), INSITU_VERTEX, borrow_or_copy_array(array, field, p.held, log), p);
     }
 }
 
@@ -173,12 +173,13 @@ void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string
         }
         p.held.objects.emplace_back(array);
         if (cells.is_one_to_one) {
-            add_field(array->GetName(), INSITU_CELL, view_array(array, field, p.held, log), p);
+            add_field(array->GetName(), INSITU_CELL, borrow_or_copy_array(array, field, p.held, log), p);
             continue;
         }
         held_arrays temporary;
         conversion_log discarded_log;
-        const array_view picked = gather(view_array(array, field, temporary, discarded_log), cells.source, p.held);
+        const array_view picked =
+            gather(borrow_or_copy_array(array, field, temporary, discarded_log), cells.source, p.held);
         log.copied(field, "cells split or left out", picked.tuple_count * picked.tuple_stride_bytes);
         add_field(array->GetName(), INSITU_CELL, picked, p);
     }

@@ -219,7 +219,7 @@ int64_t type_size(insitu_type type)
     }
 }
 
-array_view view_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log)
+array_view borrow_or_copy_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log)
 {
     array_view view;
     if (borrow<float>(array, view) || borrow<double>(array, view) || borrow<int>(array, view) ||

@@ -59,7 +59,7 @@ int64_t type_size(insitu_type type);
 
 /* Returns the array as a field's values: borrowed, or copied if libinsitu does not support VTK's type or layout. `what`
  * is the name of the array in reports. */
-array_view view_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log);
+array_view borrow_or_copy_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log);
 
 /* Describes the coordinates of points as three arrays: borrowed if they are AOS or SOA, otherwise copied. */
 void view_points(vtkDataArray *points, const std::string &what, held_arrays &held, conversion_log &log,

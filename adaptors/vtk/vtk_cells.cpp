@@ -355,8 +355,8 @@ bool has_equal_orders_on_axes(vtkUnstructuredGrid *grid)
 }
 
 template <typename Array>
-bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const cells_view &view,
-                std::string &error)
+bool borrow_or_convert_cells(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const cells_view &view,
+                             std::string &error)
 {
     using id = typename Array::ValueType;
     raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0), connectivity->GetPointer(0),
@@ -398,8 +398,8 @@ bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &
         return false;
     }
     if (array->IsStorage64Bit())
-        return view_typed(grid, array->GetOffsetsArray64(), array->GetConnectivityArray64(), view, error);
-    return view_typed(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), view, error);
+        return borrow_or_convert_cells(grid, array->GetOffsetsArray64(), array->GetConnectivityArray64(), view, error);
+    return borrow_or_convert_cells(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), view, error);
 }
 
 void log_cells(const cell_counts &counts, const std::string &what, conversion_log &log)

@@ -43,7 +43,7 @@ bool set_axes(vtkRectilinearGrid *grid, const std::string &what, held_arrays &he
     if (!grid) return false;
     vtkDataArray *axes[3] = {grid->GetXCoordinates(), grid->GetYCoordinates(), grid->GetZCoordinates()};
     for (int a = 0; a < 3; a++) {
-        array_view view = view_array(axes[a], what + " axis", held, log);
+        array_view view = borrow_or_copy_array(axes[a], what + " axis", held, log);
         held.objects.emplace_back(axes[a]);
         if (view.type != INSITU_FLOAT32 && view.type != INSITU_FLOAT64) {
             auto *copy = reinterpret_cast<double *>(held.allocate(static_cast<size_t>(view.tuple_count) * 8));

@@ -18,7 +18,7 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
 
 /* Plans how to pack a sheet with many gaps: its `count` values are first moved together, so that they fill rows of 16
  * without gaps. This saves time, because a row with few values takes as long to pack as a full one. */
-static void plan_compact(int count, sheet_plan *plan)
+static void plan_rows_without_gaps(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;
     plan->count = count;
@@ -67,7 +67,7 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
         comp_sheet compact;
         sheet_plan compact_plan;
         loops->compress(sheet, &plan, words, &compact);
-        plan_compact(plan.count, &compact_plan);
+        plan_rows_without_gaps(plan.count, &compact_plan);
         at = loops->write(&compact, &compact_plan, words, &head.kinds, at);
     } else if (plan.count) {
         at = loops->write(sheet, &plan, words, &head.kinds, at);
@@ -109,7 +109,7 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
     if (plan.is_sparse) {
         comp_sheet compact;
         sheet_plan compact_plan;
-        plan_compact(plan.count, &compact_plan);
+        plan_rows_without_gaps(plan.count, &compact_plan);
         loops->read(at, &compact_plan, head.kinds, words, &compact);
         loops->expand(&compact, &plan, words, sheet);
     } else if (plan.count) {

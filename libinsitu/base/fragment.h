@@ -34,7 +34,7 @@ enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYE
 /* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
  * still visible. If a rank dropped its faint fragments, its pictures would differ from those of a rank that has folded
  * the fragments with others (fragment_fold.h). */
-static inline bool fragment_shows(const fragment *f)
+static inline bool fragment_changes_picture(const fragment *f)
 {
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
 }

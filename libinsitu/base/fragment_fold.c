@@ -60,7 +60,7 @@ static double find_leaf_begin(int32_t leaf)
     return (double)leaf / (FRAGMENT_INTERVALS << FRAGMENT_HALVINGS);
 }
 
-static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
+static bool has_all_fragments_of_node(const fold_part *part, int32_t first_leaf, int height)
 {
     return (double)part->begin <= find_leaf_begin(first_leaf) &&
            find_leaf_begin(first_leaf + (1 << height)) <= (double)part->end;
@@ -70,7 +70,7 @@ static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
  * fragments in a descendant of the node, the fragments in that descendant are first folded to one fragment. */
 static void fold_node(fold_part *part, const fragment *sorted, int64_t count, int32_t first_leaf, int height)
 {
-    while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {
+    while (count > 1 && height > 0 && !has_all_fragments_of_node(part, first_leaf, height)) {
         const int32_t middle = first_leaf + (1 << --height);
         int64_t left = 0;
         while (left < count && fragment_find_leaf(sorted[left].t_in) < middle) left++;
@@ -79,7 +79,7 @@ static void fold_node(fold_part *part, const fragment *sorted, int64_t count, in
         count -= left;
         first_leaf = middle;
     }
-    if (count > 1 && !has_all_of(part, first_leaf, height)) {
+    if (count > 1 && !has_all_fragments_of_node(part, first_leaf, height)) {
         for (int64_t i = 0; i < count; i++) part->out[part->count++] = sorted[i];
     } else if (count) {
         part->out[part->count++] = fragment_fold(sorted, count);

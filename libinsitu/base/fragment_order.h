@@ -22,7 +22,7 @@ static inline int fragment_compare_numbers(uint32_t a, uint32_t b)
     return (a > b) - (a < b);
 }
 
-static inline int fragment_compare_rest(const fragment *a, const fragment *b)
+static inline int fragment_compare_other_members(const fragment *a, const fragment *b)
 {
     const float of_a[] = {a->t_in, a->t_out, a->transmittance, a->colour[0], a->colour[1], a->colour[2]};
     const float of_b[] = {b->t_in, b->t_out, b->transmittance, b->colour[0], b->colour[1], b->colour[2]};
@@ -42,7 +42,7 @@ static inline int fragment_compare(const fragment *a, const fragment *b)
         if (order) return order;
     }
     const int order = (b->kind >= FRAGMENT_SURFACE) - (a->kind >= FRAGMENT_SURFACE);
-    return order ? order : fragment_compare_rest(a, b);
+    return order ? order : fragment_compare_other_members(a, b);
 }
 
 #endif

@@ -418,7 +418,7 @@ static inline bool grid_is_drawn(const grid *g, int64_t cell)
 }
 
 /* Returns whether the cell is drawn or is a shell. Pictures may show these cells. */
-static inline bool grid_is_seen(const grid *g, int64_t cell)
+static inline bool grid_can_be_shown(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
 }
@@ -452,7 +452,7 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
 
 /* Returns whether the cell's own value is finite, if values at vertices were computed from cell values; otherwise
  * returns true. */
-static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
+static inline bool grid_has_finite_cell_value(const grid_field *f, int64_t cell)
 {
     return !f->source_cells || isfinite(grid_field_value(f->source_cells, cell));
 }
@@ -462,7 +462,7 @@ static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
 static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
                                     double *values)
 {
-    bool finite = grid_has_own_value(f, cell);
+    bool finite = grid_has_finite_cell_value(f, cell);
     for (int i = 0; i < count; i++) {
         values[i] = grid_field_value(f, f->is_cell_centred ? cell : vertices[i]);
         finite = finite && isfinite(values[i]);

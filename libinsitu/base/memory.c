@@ -60,7 +60,7 @@ void *base_calloc(size_t count, size_t size)
     return block;
 }
 
-static size_t block_bytes(const void *block)
+static size_t read_block_size(const void *block)
 {
     size_t bytes;
     memcpy(&bytes, (const char *)block - header_bytes, sizeof bytes);
@@ -69,7 +69,7 @@ static size_t block_bytes(const void *block)
 
 void base_set_used_bytes(void *block, size_t bytes)
 {
-    count_bytes((long long)bytes - (long long)block_bytes(block));
+    count_bytes((long long)bytes - (long long)read_block_size(block));
     memcpy((char *)block - header_bytes, &bytes, sizeof bytes);
 }
 
@@ -77,7 +77,7 @@ void *base_realloc(void *block, size_t bytes)
 {
     void *grown = base_alloc(bytes);
     if (!grown || !block) return grown;
-    const size_t old_bytes = block_bytes(block);
+    const size_t old_bytes = read_block_size(block);
     memcpy(grown, block, old_bytes < bytes ? old_bytes : bytes);
     base_free(block);
     return grown;
@@ -86,7 +86,7 @@ void *base_realloc(void *block, size_t bytes)
 void base_free(void *block)
 {
     if (!block) return;
-    count_bytes(-(long long)block_bytes(block));
+    count_bytes(-(long long)read_block_size(block));
     free((char *)block - header_bytes);
 }
 

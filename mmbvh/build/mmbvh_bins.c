@@ -110,7 +110,8 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
 static inline vec4 compute_three_half_areas(const lanes boxes[3])
 {
     const lanes x = item_extent(boxes[0]), y = item_extent(boxes[1]), z = item_extent(boxes[2]);
-    const ivec4 xy = item_area_terms(__builtin_shufflevector(x, y, 0, 1, 2, 3, 8, 9, 10, 11)), zz = item_area_terms(z);
+    const ivec4 xy = item_half_area_summands(__builtin_shufflevector(x, y, 0, 1, 2, 3, 8, 9, 10, 11)),
+                zz = item_half_area_summands(z);
     return vec4_from_int(__builtin_shufflevector(xy, zz, 0, 2, 4, 6)) +
            vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
@@ -173,7 +174,7 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
 float bins_compute_cost_bound(const item *items, int64_t count)
 {
     vec4 terms = {0};
-    for (int64_t i = 0; i < count; i++) terms += vec4_from_int(item_area_terms(item_extent(items[i])));
+    for (int64_t i = 0; i < count; i++) terms += vec4_from_int(item_half_area_summands(item_extent(items[i])));
     return terms[0] + terms[1];
 }
 

@@ -314,8 +314,8 @@ static void finish_tree(build *b, const sweep *ranges, mmbvh *out)
 {
     const sweep s = sweep_of_bounds_and_ranges(&b->tree, &b->source, ranges);
     b->tree.unusable_cells = sweep_tree(&s, b->threads).count;
-    b->tree.area = b->tree.built_area = cost_area_of_tree(&b->tree, b->threads);
-    b->tree.built_cost = cost_of_area(&b->tree, b->tree.area);
+    b->tree.area = b->tree.built_area = compute_area_sum_of_tree(&b->tree, b->threads);
+    b->tree.built_cost = compute_cost_from_area_sum(&b->tree, b->tree.area);
     *out = b->tree;
 }
 

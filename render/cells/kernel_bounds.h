@@ -204,7 +204,7 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
 
 /* Multiplies the map's nonlinear coefficients by the inverse of its Jacobian at the centre. The result is the
  * coefficients of the map's nonlinear part N in reference coordinates (kernel_roots.h). */
-SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
+SIMD_INLINE void kernel_bounds_compute_nonlinear_map(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
     const kernel_f64 zero = {0};
@@ -239,7 +239,7 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 /* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
  * of the difference E = field - L. Returns the sum of the magnitudes of L's terms, to which the rounding error of L at
  * positions in the cell is proportional. */
-SIMD_INLINE kernel_f64 kernel_bounds_lanes_linear(kernel_bounds_lanes *b, int type)
+SIMD_INLINE kernel_f64 kernel_bounds_fit_linear_function(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
     kernel_f64 df[3], size = {0};
@@ -276,7 +276,7 @@ SIMD_INLINE kernel_f64 kernel_f64_largest_error(int type, const kernel_f64 e[8])
 
 /* Computes, at all corners, the gradients of the field and of E = field - L, and the difference between the derivative
  * of the map's nonlinear part N and that at the centre. */
-SIMD_INLINE void kernel_bounds_lanes_slopes(kernel_bounds_lanes *b, int type)
+SIMD_INLINE void kernel_bounds_compute_corner_derivatives(kernel_bounds_lanes *b, int type)
 {
     const kernel_domain *table = kernel_domain_of(type);
     kernel_f64 field[8];
@@ -299,7 +299,7 @@ SIMD_INLINE kernel_f64 kernel_f64_squared_length(const kernel_f64 v[3])
 /* Returns the sum of the 8th powers of the singular values of m. Let |m| be the matrix norm, the largest singular
  * value. The sum is at least |m|^8 and at most 1.15^8 |m|^8. Its 8th root is a norm, too, so that the maximum of the
  * sum over the corners is an upper bound of |m|^8 in the whole domain. */
-SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
+SIMD_INLINE kernel_f64 kernel_f64_eighth_power_norm(const kernel_f64 m[3][3])
 {
     kernel_f64 square[3][3], fourth[3][3], sum = {0};
     for (int i = 0; i < 3; i++)
@@ -316,7 +316,7 @@ SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
 
 /* Computes the members theta, slope, most_along, slant and most_turn, which are maxima over the corners of the domain.
  * w: direction of the tile's middle ray in reference coordinates, J0^-1 (0, 0, 1). */
-SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, const kernel_f64 w[3])
+SIMD_INLINE void kernel_bounds_maximize_over_corners(kernel_bounds_lanes *b, int type, const kernel_f64 w[3])
 {
     const kernel_domain *table = kernel_domain_of(type);
     const kernel_f64 zero = {0};
@@ -336,7 +336,7 @@ SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, c
             steep += de[i] * de[i];
             turn += term * term;
         }
-        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend),
+        const kernel_f64 eighth = kernel_f64_eighth_power_norm((const kernel_f64(*)[3])bend),
                          square = kernel_f64_squared_length(df);
         theta = n ? kernel_f64_more(eighth, theta) : eighth;
         slope = n ? kernel_f64_more(square, slope) : square;
@@ -354,8 +354,8 @@ SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, c
 /* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices lie
  * (out->normal, low and high). The planes are moved outward by `pad`, an upper bound of the error of a ray's positions
  * in reference coordinates. */
-SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad, int half,
-                                   kernel_bounds *out)
+SIMD_INLINE void kernel_bounds_store_enclosing_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad,
+                                                      int half, kernel_bounds *out)
 {
     kernel_f64 low = {0}, high = {0};
     for (int n = 1; n < grid_type_vertices(type); n++) {
@@ -401,7 +401,8 @@ SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlin
  * found between the computed crossings of faces. These crossings lie within `gap` of the ray, and the values there
  * differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K).
  * domain_margin is twice the sum of all these. */
-SIMD_INLINE void kernel_f64_contraction_bounds(const kernel_bounds_lanes *b, int type, int half, kernel_bounds *out)
+SIMD_INLINE void kernel_bounds_store_iteration_errors(const kernel_bounds_lanes *b, int type, int half,
+                                                      kernel_bounds *out)
 {
     const kernel_f64 zero = {0}, one = zero + 1, speed = b->length / b->rise, wide = b->across * 5e5;
     const kernel_f64 rate = b->theta + b->slant * speed * 1.0001, rest = one - rate;
@@ -451,13 +452,13 @@ SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int hal
     kernel_f64_store_half(out->middle, half, middle[3]);
     kernel_f64_terms_about_middle(type, b->e + 4, terms);
     for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store_half(out->field_terms[j], half, terms[j]);
-    kernel_f64_contraction_bounds(b, type, half, out);
+    kernel_bounds_store_iteration_errors(b, type, half, out);
 }
 
 /* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
  * it is multiplied by k^2: for a b / k, with a / k and b / k in [-1/32, 33/32], the second derivatives are at most 1,
  * 33/32, 33/32 and 2.13 over k, so their norm is 3.29 / k. */
-SIMD_INLINE kernel_f64 kernel_f64_hessian(int type, const kernel_f64 c[4])
+SIMD_INLINE kernel_f64 kernel_f64_bound_squared_hessian(int type, const kernel_f64 c[4])
 {
     kernel_f64 sum = {0};
     if (kernel_has_apex(type)) return c[0] * c[0] * (3.29 * 3.29);
@@ -476,12 +477,12 @@ SIMD_INLINE void kernel_f64_store_search_bounds(const kernel_bounds_lanes *b, in
     kernel_f64 twist = {0}, field[4];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 4; j++) kernel_f64_store_half(out->nonlinear_part[i][j], half, b->nonlinear_part[i][j]);
-        twist += kernel_f64_hessian(type, b->nonlinear_part[i]);
+        twist += kernel_f64_bound_squared_hessian(type, b->nonlinear_part[i]);
     }
     for (int j = 0; j < 4; j++) field[j] = kernel_f64_rounded(b->exact[3][4 + j]);
     kernel_f64_store_half(out->stretch, half, stretch);
     kernel_f64_store_half(out->slope, half, b->slope);
-    kernel_f64_store_half(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
+    kernel_f64_store_half(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_bound_squared_hessian(type, field)));
     kernel_f64_store_half(out->map_curvature, half, kernel_f64_sqrt(twist));
 }
 
@@ -506,9 +507,9 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
     kernel_bounds_lanes b;
     kernel_f64 w[3], length = zero, off = zero, gap = zero;
     kernel_bounds_lanes_fit(&b, type, at, half);
-    kernel_bounds_lanes_bend(&b, type);
-    const kernel_f64 size = kernel_bounds_lanes_linear(&b, type), *const g = b.gradient;
-    kernel_bounds_lanes_slopes(&b, type);
+    kernel_bounds_compute_nonlinear_map(&b, type);
+    const kernel_f64 size = kernel_bounds_fit_linear_function(&b, type), *const g = b.gradient;
+    kernel_bounds_compute_corner_derivatives(&b, type);
     b.across = 2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
         const kernel_f64 side = kernel_f64_abs(b.inverse[i][0]) + kernel_f64_abs(b.inverse[i][1]);
@@ -518,9 +519,9 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
         length += w[i] * w[i];
         off += term * term;
         gap += error_bound * error_bound;
-        kernel_f64_planes(&b, type, i, error_bound + 1e-5, half, out);
+        kernel_bounds_store_enclosing_planes(&b, type, i, error_bound + 1e-5, half, out);
     }
-    kernel_bounds_lanes_corners(&b, type, w);
+    kernel_bounds_maximize_over_corners(&b, type, w);
     const kernel_f64_mask bends_little = (kernel_f64_mask)(b.theta < 0.9);
     const kernel_f64 stretch =
         kernel_f64_select(bends_little, kernel_f64_rounded(1 / (1 - b.theta)), kernel_f64_set(10));

@@ -105,13 +105,13 @@ SIMD_INLINE vm kernel_rays_inside_triangle(vm rays, vf ij, vf jk, vf ik)
 
 /* Returns the weighted sum of a quantity (depth or field) over the vertices of a crossed triangle. i, j, k: the
  * quantity at the vertices; ij, jk, ik: the edge functions, which give the weights (kernel_cell.h). Divided by
- * kernel_weight() it is the quantity at the crossing. */
+ * kernel_sum_weights() it is the quantity at the crossing. */
 SIMD_INLINE vf kernel_weighted_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
 }
 
-SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
+SIMD_INLINE vf kernel_sum_weights(vf ij, vf jk, vf ik)
 {
     return (jk - ik) + ij;
 }
@@ -125,8 +125,10 @@ SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, 
 
 /* Returns the least sum of weights at which crossings of the triangle i, j, k are accurate (kernel_least_weight()). The
  * vertices must be in the order of coordinates. */
-static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_tile_position i,
-                                                                   kernel_tile_position j, kernel_tile_position k)
+static __attribute__((noinline, cold)) float kernel_compute_triangle_least_weight(const kernel_packet *p,
+                                                                                  kernel_tile_position i,
+                                                                                  kernel_tile_position j,
+                                                                                  kernel_tile_position k)
 {
     const kernel_edge_error ij = kernel_edge_error_between(p, i, j), jk = kernel_edge_error_between(p, j, k),
                             ik = kernel_edge_error_between(p, i, k);
@@ -171,19 +173,19 @@ typedef struct kernel_weights {
 
 SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, vf ik)
 {
-    return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
+    return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_sum_weights(ij, jk, ik)};
 }
 
 /* Replaces the weights of crossings of the triangle i, j, k on those of the rays in `hit` on which they are not
  * accurate enough: the new weights are computed from the triangle's projected vertices. least: an upper bound of
- * kernel_triangle_least() for the triangle, with which most calls return early. */
+ * kernel_compute_triangle_least_weight() for the triangle, with which most calls return early. */
 SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
                                           kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {
     if (!p->is_pencil) return;
-    const vf weight = kernel_weight(w->ij, w->jk, w->ik);
+    const vf weight = kernel_sum_weights(w->ij, w->jk, w->ik);
     if (__builtin_expect(!vm_any(kernel_is_inaccurate(hit, weight, least)), 1)) return;
-    const vm weak = kernel_is_inaccurate(hit, weight, kernel_triangle_least(p, i, j, k));
+    const vm weak = kernel_is_inaccurate(hit, weight, kernel_compute_triangle_least_weight(p, i, j, k));
     vf ij = w->ij, jk = w->jk, ik = w->ik;
     if (!vm_any(weak)) return;
     kernel_triangle_recompute(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);

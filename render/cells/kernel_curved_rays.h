@@ -54,8 +54,9 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
  * traced cell by cell. Rays in neither mask miss their cells. at: x, y and z of the cells' vertices, by vertex and
  * lane. nonconvex: per ray, a mask of its cell's faces with the bits of the quads that may be nonconvex in the
  * projection along the ray; NULL: no quad is. */
-SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
-                                    vm rays, vm *two, vm *alone, vi face[2], int type)
+SIMD_INLINE void kernel_curved_find_crossed_faces(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r,
+                                                  const vi *nonconvex, vm rays, vm *two, vm *alone, vi face[2],
+                                                  int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf x[8], y[8], least = vf_set(INFINITY);
@@ -95,7 +96,7 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
                                      vm *alone, vi face[2])
 {
     const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
-    kernel_curved_find((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, two, alone, face, type);
+    kernel_curved_find_crossed_faces((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, two, alone, face, type);
 }
 
 /* ---- crossing points ---- */
@@ -158,8 +159,8 @@ SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                                  const vf e[3])
 {
-    return vm_and(rays,
-                  vf_lt(vf_abs(kernel_weight(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
+    return vm_and(
+        rays, vf_lt(vf_abs(kernel_sum_weights(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
 /* Replaces edge functions by more accurate ones, which are computed from the projected corners. This is done for each
@@ -201,7 +202,7 @@ SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h
 SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corners *c, const vf e[3],
                                               kernel_point *out)
 {
-    const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
+    const vf inverse = 1.0f / kernel_sum_weights(e[0], e[1], e[2]);
     vf v[5][3];
     for (int i = 0; i < 3; i++) {
         v[0][i] = c->at[i][2];
@@ -234,8 +235,8 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
                 quad[n].y[i] = corners[n].at[i][1];
                 quad[n].z[i] = corners[n].at[i][2];
             }
-        /* none of the active rays meets an edge, because kernel_curved_find() adds rays that may meet one to its mask
-         * `alone` */
+        /* none of the active rays meets an edge, because kernel_curved_find_crossed_faces() adds rays that may meet one
+         * to its mask `alone` */
         kernel_quads_cross(quad, quads, on_quad, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_point(type, &corners[n], &places[n], &out[n]);
     }
@@ -256,8 +257,8 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
 
 /* Computes the crossings at which the active rays enter and leave their cells. faces: index of the first face that a
  * ray crosses, plus 8 times the index of the second one. */
-SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
-                                     kernel_point out[2])
+SIMD_INLINE void kernel_curved_compute_crossings(const kernel_transformed_curved *h, const kernel_lane_rays *p,
+                                                 int type, vi faces, kernel_point out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
     kernel_curved_corners corners[2];

@@ -73,8 +73,8 @@ typedef struct kernel_poly_crossings {
     int sheet_count;
     kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
     bool has_sheets, has_tets;
-    /* interval: the current interval of each ray inside the cell (kernel_poly_next()), with the values on the faces;
-     * in, out: the crossings at its ends; u_in, u_out: the field just inside the ends */
+    /* interval: the current interval of each ray inside the cell (kernel_poly_find_next_interval()), with the values on
+     * the faces; in, out: the crossings at its ends; u_in, u_out: the field just inside the ends */
     kernel_interval interval;
     kernel_triangle_crossings in, out;
     vf u_in, u_out;
@@ -344,7 +344,7 @@ SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_trian
 }
 
 /* Computes the next interval of each ray inside the cell. Returns false after the last one. */
-static bool kernel_poly_next(kernel_poly_crossings *r)
+static bool kernel_poly_find_next_interval(kernel_poly_crossings *r)
 {
     kernel_interval *i = &r->interval;
     if (!kernel_poly_take_nearest(r, &r->in) || !kernel_poly_take_nearest(r, &r->out)) return false;
@@ -427,7 +427,7 @@ SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool befor
     return vm_and(s->mask, vm_and(vf_le(s->t_in, t), vf_lt(t, s->t_out)));
 }
 
-SIMD_INLINE vf kernel_subtet_at(const kernel_interval *s, vf t, vf v_in, vf v_out)
+SIMD_INLINE vf kernel_subtet_interpolate_value(const kernel_interval *s, vf t, vf v_in, vf v_out)
 {
     return v_in + (t - s->t_in) * ((v_out - v_in) / (s->t_out - s->t_in));
 }
@@ -450,8 +450,8 @@ static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, 
             if (!vm_any(in)) continue;
             const float sign = r->cell->facets[n].sign;
             cover = vf_select(in, cover + sign, cover);
-            sum = vf_select(in, sum + sign * kernel_subtet_at(s, at, s->v_in, s->v_out), sum);
-            colour = vf_select(in, colour + sign * kernel_subtet_at(s, at, s->w_in, s->w_out), colour);
+            sum = vf_select(in, sum + sign * kernel_subtet_interpolate_value(s, at, s->v_in, s->v_out), sum);
+            colour = vf_select(in, colour + sign * kernel_subtet_interpolate_value(s, at, s->w_in, s->w_out), colour);
         }
         const vm good = vm_and(open, vf_eq(cover, vf_set(1)));
         *v = vf_select(good, sum, *v);

@@ -60,7 +60,8 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
 }
 
 /* Replaces the edge functions whose sign is uncertain by those of the projected vertices, whose signs are exact. */
-static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+static __attribute__((noinline)) void kernel_tets_recompute_uncertain_edges(const kernel_tets *t,
+                                                                            vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
     kernel_tets_edges_projected(t, exact);
@@ -91,7 +92,7 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
     if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt), least))), 0)) {
         kernel_lane_rays lane_rays;
         const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
-        kernel_tets_in_double(&copy, e);
+        kernel_tets_recompute_uncertain_edges(&copy, e);
     }
 }
 
@@ -124,7 +125,7 @@ SIMD_INLINE kernel_sums kernel_tets_weighted_sums(const kernel_tets *t, const si
     return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, at[2]),
                          .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f),
                          .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, colours) : vf_set(0),
-                         .weight = kernel_weight(ij, jk, ik)};
+                         .weight = kernel_sum_weights(ij, jk, ik)};
 }
 
 SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const kernel_sums *b)
@@ -193,7 +194,7 @@ kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
         const int ij = face[3], jk = face[4], ik = face[5];
-        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_weight(e[ij], e[jk], e[ik]));
+        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_sum_weights(e[ij], e[jk], e[ik]));
         sums[n] =
             kernel_tets_weighted_sums(t, face, vf_select(weak, exact[ij], e[ij]), vf_select(weak, exact[jk], e[jk]),
                                       vf_select(weak, exact[ik], e[ik]), has_colour);

@@ -40,7 +40,8 @@ typedef struct kernel_transformed_curved {
      * cu, cv and bound of kernel_line, each for the edges ij, jk and ik, where i, j, k are the triangle's corners in
      * the order of coordinates. */
     float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
-    /* for each triangle, the least sum of weights at which its crossings are accurate (kernel_triangle_least()) */
+    /* for each triangle, the least sum of weights at which its crossings are accurate
+     * (kernel_compute_triangle_least_weight()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
     /* The following two members are used only for segments of volumes (kernel_local_crossings.h). nonconvex: per cell,

@@ -57,7 +57,7 @@ static size_t rounded(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
-static void *grown(char **buffer, size_t *held, size_t bytes)
+static void *ensure_buffer_size(char **buffer, size_t *held, size_t bytes)
 {
     if (bytes <= *held) return *buffer;
     base_free(*buffer);
@@ -69,7 +69,7 @@ static void *grown(char **buffer, size_t *held, size_t bytes)
 
 void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
 {
-    return grown(&store->scratch, &store->scratch_bytes, bytes);
+    return ensure_buffer_size(&store->scratch, &store->scratch_bytes, bytes);
 }
 
 /* Returns memory for a polyhedron. If there is no space, all other polyhedra are removed from the store. */
@@ -80,7 +80,7 @@ static void *store_alloc(polyhedron_store *store, size_t bytes)
         const size_t twice = store->memory_bytes ? 2 * store->memory_bytes : STORE_BYTES;
         const size_t wanted = twice < STORE_LIMIT ? twice : store->memory_bytes;
         polyhedra_reset(store);
-        if (!grown(&store->memory, &store->memory_bytes, wanted > bytes ? wanted : bytes)) return NULL;
+        if (!ensure_buffer_size(&store->memory, &store->memory_bytes, wanted > bytes ? wanted : bytes)) return NULL;
     }
     store->used += bytes;
     return store->memory + store->used - bytes;
@@ -190,7 +190,7 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 static void store_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};
-    c->is_finite = grid_has_own_value(w->field, cell);
+    c->is_finite = grid_has_finite_cell_value(w->field, cell);
     c->is_constant = true;
     for (int i = 0; i < c->vertex_count; i++) {
         const work_vertex *v = &w->vertices[i];
@@ -284,7 +284,7 @@ static polyhedron *decompose_polyhedron(polyhedron_store *store, const grid *g, 
 {
     work w = {.g = g, .field = field};
     if (!closed_faces_count(&w.faces, g, index)) return NULL;
-    char *buffer = grown(&store->work, &store->work_bytes, lay_out(&w, NULL));
+    char *buffer = ensure_buffer_size(&store->work, &store->work_bytes, lay_out(&w, NULL));
     if (!buffer) return NULL;
     lay_out(&w, buffer);
     read_faces(&w, index);

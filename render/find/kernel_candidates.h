@@ -119,7 +119,7 @@ static void kernel_process_queued_cells(kernel_finder *s)
     s->queued_count = 0;
 }
 
-static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
+static void kernel_queue_leaf_cells(kernel_finder *s, const uint32_t *cells, int count)
 {
     const grid *g = s->arrays.cells;
     const bool is_plain = !g->offsets.data && !g->cell_types && !g->lattice;
@@ -135,7 +135,7 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
     }
 }
 
-static void kernel_find_flush(kernel_finder *s)
+static void kernel_process_all_queued_cells(kernel_finder *s)
 {
     kernel_process_queued_cells(s);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_process_pending_cells(s, &s->pending[i]);
@@ -209,14 +209,15 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
             __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref + MMBVH_MAX_LEAF) : next + ranges->stride);
         }
         for (int n = 0; n < leaf_count; n++)
-            kernel_find_leaf(s, tree->cells + mmbvh_node_ref(tree, leaves[n]), mmbvh_node_count(tree, leaves[n]));
+            kernel_queue_leaf_cells(s, tree->cells + mmbvh_node_ref(tree, leaves[n]),
+                                    mmbvh_node_count(tree, leaves[n]));
         while (child_count) {
             const int64_t left = children[--child_count];
             stack[top++] = left + 2;
             stack[top++] = left;
         }
     }
-    kernel_find_flush(s);
+    kernel_process_all_queued_cells(s);
 }
 
 #endif

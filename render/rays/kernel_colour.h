@@ -65,7 +65,7 @@ SIMD_INLINE vf kernel_find_colour_table_position(const kernel_transfer *t, vf x)
 
 /* Computes the colour at the position `along` in the colour table, from 0 at its first to 1 at its last entry; NaN
  * gives the first colour. */
-SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
+SIMD_INLINE void kernel_look_up_colour(const kernel_transfer *t, vf along, vf out[3])
 {
     const vf place = vf_clamp(along, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
     const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
@@ -85,7 +85,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
  * colour. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
-    kernel_table_at(t, kernel_find_colour_table_position(t, x), out);
+    kernel_look_up_colour(t, kernel_find_colour_table_position(t, x), out);
 }
 
 /* Returns the opacity at a position in the colour table. */
@@ -166,7 +166,8 @@ typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
 
-/* Returns the rays whose fragment is visible: it absorbs light or its colour is not black (fragment_shows()). */
+/* Returns the rays whose fragment is visible: it absorbs light or its colour is not black (fragment_changes_picture()).
+ */
 SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);

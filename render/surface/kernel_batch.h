@@ -62,7 +62,7 @@ static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace
                                                          kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
-    kernel_surface_cells_close(t, queued);
+    kernel_surface_cells_fill_lanes(t, queued);
     kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
     kernel_lanes_subtract_isovalues(b->tets.values, 4, queued->isovalue, b->tets.f);
     kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])b->tets.world, 4);

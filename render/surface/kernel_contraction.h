@@ -162,7 +162,8 @@ SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contracti
 /* Finds each ray's only crossing of the isovalue in its cell, or proves that there is none, without intersecting faces.
  * out->mask: rays with exactly one crossing; out->t: its depth relative to vertex 0; out->r: its reference coordinates.
  * The crossing is accurate to KERNEL_CONTRACTION_END. *none: rays without a crossing. The other rays are undecided. */
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, vm rays, kernel_point *out, vm *none, int type)
+SIMD_INLINE void kernel_find_only_root_by_contraction(const kernel_contraction *c, vm rays, kernel_point *out, vm *none,
+                                                      int type)
 {
     const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / c->rise, t = (c->level + c->middle) * over;

@@ -83,7 +83,7 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
 /* Computes value_error and domain_margin of the lanes in `cuboid`. In the code, reach is the largest magnitude of the
  * vertices' coordinates, gap an upper bound of the distance between a face's computed crossing and the ray, and own an
  * error bound of a ray's reference coordinates; gap and own are in reference coordinates. Both are derived at
- * kernel_f64_bounds() and kernel_f64_contraction_bounds(), and are doubled as there. */
+ * kernel_f64_bounds() and kernel_bounds_store_iteration_errors(), and are doubled as there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {

@@ -155,7 +155,7 @@ SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi 
 
 /* Keeps some of the SIMD_WIDTH rays from index n on of the list h->rays (bit mask `rays`): moves them to the index
  * `kept` of the same list and the following ones. Returns the new number of kept rays. */
-SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
+SIMD_INLINE int kernel_curved_batch_keep_rays(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {
         const int i = n + __builtin_ctz(rays);
@@ -193,11 +193,11 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         p.active = vm_andnot(p.active, kernel_curved_batch_misses_slab(h, p.lane, &c));
         if (!vm_any(p.active)) continue;
         kernel_contraction_set_cell(&h->bounds, p.lane, type, &c);
-        kernel_contract(&c, p.active, &at, &none, type);
+        kernel_find_only_root_by_contraction(&c, p.active, &at, &none, type);
         at.t += kernel_gather_lane(h->transformed.at[2][0], p.lane);
         at.value = vf_set(0);
         kernel_curved_ends_add(&h->rays, n, &at, 1, vm_bits(at.mask), &h->found, h->found_ends);
-        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
+        kept = kernel_curved_batch_keep_rays(h, n, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
     }
     h->rays.count = kept;
     kernel_pixel_list_pad(&h->rays);
@@ -247,7 +247,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_
 /* Computes the points at which the rays in `met` enter and leave their cells, and the field there. Rays with exactly
  * one root according to these values are added to `found`. Rays whose roots must be searched for are added to `others`.
  */
-SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
+SIMD_INLINE void kernel_curved_batch_cross_faces(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
     h->found.count = h->others.count = 0;
@@ -259,7 +259,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vi faces = kernel_load_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
         kernel_lane_rays_set_far(&p, t);
-        kernel_curved_cross(&h->transformed, &p, type, faces, ends);
+        kernel_curved_compute_crossings(&h->transformed, &p, type, faces, ends);
         ends[1].value = kernel_end_in_cell(ends[0].value, ends[1].value, t->surface->layer->is_of_faces);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(kernel_lane_rays_near(t, &p), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
@@ -273,7 +273,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
 
 static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_cross_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_cross_faces, t, h);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
@@ -365,7 +365,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
             kernel_curved_batch_store_normal(t, gradient, root.r, normal);
             nearer |= kernel_curved_batch_accept(t, h, &p, hit, &root, normal);
         }
-        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
+        kept = kernel_curved_batch_keep_rays(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
     }
     h->rays.count = kept;
     kernel_pixel_list_pad(&h->rays);
@@ -392,7 +392,7 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, k
             at = ends[0];
             kernel_refine_accurate_roots(&p.rays, &map, p.active, &at);
         } else {
-            open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
+            open = kernel_refine_roots_by_newton(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         }
         const vm hit = kernel_visible_lane_hits(t, &p, vm_andnot(p.active, open), at.t);
         if (__builtin_expect(vm_any(open), 0))
@@ -496,7 +496,7 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
-    kernel_surface_cells_close(t, queued);
+    kernel_surface_cells_fill_lanes(t, queued);
     h->queued = queued;
     const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
                                                  queued->isovalue, queued->type);

@@ -21,7 +21,7 @@
 #include "simd.h"
 
 /* Returns whether hits on the current layer only need the colours of their isovalues, so that they can be accepted
- * without a packet of their own (kernel_ray_accept()). */
+ * without a packet of their own (kernel_accept_opaque_hit_of_ray()). */
 SIMD_INLINE bool kernel_tile_hits_are_plain(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
@@ -104,8 +104,8 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
  * kernel_accept() does for the rays of a packet. at: position of the ray among those of the tile's packets (packet *
  * SIMD_WIDTH + lane); normal: as in kernel_hits; colour: before lighting. Returns the bit of the ray's block if the hit
  * is nearer than the ray's previous one, and otherwise 0. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_surface_cells *cells, int n,
-                                       float depth, const float normal[3], const float colour[3])
+SIMD_INLINE unsigned kernel_accept_opaque_hit_of_ray(kernel_tile_trace *t, int at, const kernel_surface_cells *cells,
+                                                     int n, float depth, const float normal[3], const float colour[3])
 {
     const kernel_surface *s = t->surface;
     const int ray = at % SIMD_WIDTH;
@@ -132,9 +132,9 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }
 
-/* Accepts hits of an opaque surface ray by ray (kernel_ray_accept()). normal: per ray, as in kernel_hits; colour: per
- * ray, before lighting, or NULL for the colours of the isovalues. Returns a mask of the blocks that contain a ray whose
- * hit is nearer than its previous one. */
+/* Accepts hits of an opaque surface ray by ray (kernel_accept_opaque_hit_of_ray()). normal: per ray, as in kernel_hits;
+ * colour: per ray, before lighting, or NULL for the colours of the isovalues. Returns a mask of the blocks that contain
+ * a ray whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_lane_hits_accept_opaque(kernel_tile_trace *t, const kernel_surface_cells *cells,
                                                     const kernel_lane_rays *r, vm hit, vf depth, const vf normal[3],
                                                     const vf *colour)
@@ -148,8 +148,9 @@ SIMD_INLINE unsigned kernel_lane_hits_accept_opaque(kernel_tile_trace *t, const 
         const float ray_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
         float ray_colour[3];
         for (int a = 0; colour && a < 3; a++) ray_colour[a] = colour[a][i];
-        blocks |= kernel_ray_accept(t, at[i], cells, n, depth[i], ray_normal,
-                                    colour ? ray_colour : t->surface->layer->colours + 3 * cells->value[n]);
+        blocks |=
+            kernel_accept_opaque_hit_of_ray(t, at[i], cells, n, depth[i], ray_normal,
+                                            colour ? ray_colour : t->surface->layer->colours + 3 * cells->value[n]);
     }
     return blocks;
 }

@@ -210,8 +210,8 @@ SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const
 
 /* Computes, for each slab of a leaf, its linear function L along the ray, which is level + rise * t at the distance t,
  * and the slab's thickness, enlarged by the rounding error of L. */
-SIMD_INLINE void kernel_prepared_ray_level(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
-                                           vf *thickness)
+SIMD_INLINE void kernel_compute_slab_functions(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
+                                               vf *thickness)
 {
     *level = vf_load(rows + KERNEL_SLAB_LEVEL * SIMD_WIDTH);
     *rise = vf_set(0);
@@ -225,7 +225,7 @@ SIMD_INLINE void kernel_prepared_ray_level(const kernel_prepared_ray *p, const f
 }
 
 /* Returns the slabs of a leaf in whose cells the ray may cross the surface: the ray meets the cell's box and, within
- * the box and farther away than the reach, the slab. level, rise, thickness: as in kernel_prepared_ray_level(). */
+ * the box and farther away than the reach, the slab. level, rise, thickness: as in kernel_compute_slab_functions(). */
 SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
                                          vf *thickness)
 {
@@ -234,7 +234,7 @@ SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const flo
     *level = *rise = *thickness = vf_set(0);
     if (!vm_any(met)) return met;
     low = vf_max(0.9999f * vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH), low);
-    kernel_prepared_ray_level(p, rows, level, rise, thickness);
+    kernel_compute_slab_functions(p, rows, level, rise, thickness);
     const vf first = *level + *rise * low, last = *level + *rise * high;
     /* Even for a ray without an end `high` is finite, because the ray leaves the box at a finite distance. */
     const vm beside = vm_or(vf_lt(*thickness, vf_min(first, last)), vf_lt(vf_max(first, last), -*thickness));

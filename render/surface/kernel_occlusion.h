@@ -64,7 +64,7 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_kept_by_clips(const k
 
 /* Makes the rays inactive whose roots at depth t block them, and returns these rays. found: rays that have a root at t.
  */
-SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
+SIMD_INLINE vm kernel_deactivate_blocked_rays(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
     if (!vm_any(hit)) return hit;
@@ -86,7 +86,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_refine_roots(&s, &at);
-        kernel_search_close(&s, kernel_occlusion_block(p, o, s.found, at.t));
+        kernel_search_close(&s, kernel_deactivate_blocked_rays(p, o, s.found, at.t));
     } while (kernel_search_continue(&s));
 }
 
@@ -121,7 +121,7 @@ static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *
     kernel_profile_walk_begin(r, wanted, &walk);
     do {
         const vm found = kernel_profile_walk_next(r, &walk);
-        walk.open = vm_andnot(walk.open, kernel_occlusion_block(p, o, found, walk.t));
+        walk.open = vm_andnot(walk.open, kernel_deactivate_blocked_rays(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
 
@@ -129,7 +129,7 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
 {
     kernel_poly_crossings r;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r)) {
+    while (kernel_poly_find_next_interval(&r)) {
         const vm changes = kernel_changes_sign(&r.interval);
         const vm wanted =
             vm_and(kernel_interval_overlaps_ray(p, &r.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r)));

@@ -130,7 +130,7 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &two, undecided, face);
     if (!vm_any(two)) return vm_none();
     p.active = two;
-    kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, face[0] | face[1] << 3, ends);
+    kernel_curved_compute_crossings(&pairs->transformed, &p, GRID_HEX, face[0] | face[1] << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));

@@ -390,7 +390,7 @@ static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s,
     const render_surface_layer *layer = s->layer;
     kernel_poly_crossings r;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
-    while (kernel_poly_next(&r)) {
+    while (kernel_poly_find_next_interval(&r)) {
         const vm near = kernel_interval_overlaps_ray(p, &r.interval);
         if (!vm_any(near)) continue;
         const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&r.interval), kernel_polyhedron_may_cross(p, c, &r)));

@@ -429,8 +429,9 @@ SIMD_INLINE void kernel_compute_residuals(const kernel_rays *rays, const kernel_
 /* Does a step of Newton's method for the four equations X(r) = (the ray's point at depth t) and F(r) = 0 at once; t
  * stays between low->t and high->t. off, value: the equations' residuals, which are 0 if the point lies on the ray and
  * has the isovalue. Returns the rays that have not converged. */
-SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
-                                  const kernel_point *high, vm wanted, const vf off[3], vf value, kernel_point *out)
+SIMD_INLINE vm kernel_take_root_newton_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
+                                            const kernel_point *high, vm wanted, const vf off[3], vf value,
+                                            kernel_point *out)
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
     const vf zero = vf_set(0);
@@ -456,15 +457,15 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map
 }
 
 /* Does the last step of Newton's method, with residuals computed in double. */
-SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *map, vm wanted, const kernel_point *low,
-                                    const kernel_point *high, kernel_point *out)
+SIMD_INLINE void kernel_take_last_newton_step(const kernel_rays *rays, const kernel_map *map, vm wanted,
+                                              const kernel_point *low, const kernel_point *high, kernel_point *out)
 {
     kernel_point last = *out;
     vf off[3], value;
     kernel_compute_residuals(rays, map, out, off, &value);
     /* at a double root the computed derivative of the field is only a rounding error; a step that uses it would lead
      * away from the root, and is not taken */
-    const vm away = kernel_polish_step(rays, map, low, high, wanted, off, value, &last);
+    const vm away = kernel_take_root_newton_step(rays, map, low, high, wanted, off, value, &last);
     kernel_point_copy_lanes(vm_andnot(wanted, away), &last, out);
 }
 
@@ -475,13 +476,13 @@ SIMD_INLINE void kernel_refine_accurate_roots(const kernel_rays *rays, kernel_ma
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
     map->tolerance = 4 * KERNEL_CONTRACTION_END;
     at->value = vf_set(0);
-    kernel_polish_last(rays, map, wanted, &low, &high, at);
+    kernel_take_last_newton_step(rays, map, wanted, &low, &high, at);
 }
 
 /* Refines the roots between the points low and high by Newton's method; the residuals of the last step are computed in
  * double. Returns those of the wanted rays for which it does not converge. */
-SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *map, vm wanted, const kernel_point *low,
-                                   const kernel_point *high, kernel_point *out)
+SIMD_INLINE vm kernel_refine_roots_by_newton(const kernel_rays *rays, const kernel_map *map, vm wanted,
+                                             const kernel_point *low, const kernel_point *high, kernel_point *out)
 {
     const vf zero = vf_set(0), fall = low->value - high->value;
     const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, low->value / fall), zero, vf_set(1));
@@ -495,10 +496,10 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
         kernel_rays_at(rays, map, out->t, off);
         for (int a = 0; a < 3; a++) off[a] -= kernel_polynomial_value(map->position[a], map->is_pyramid, &m, out->r);
         const vf value = kernel_polynomial_value(map->field, map->is_pyramid, &m, out->r);
-        open = kernel_polish_step(rays, map, low, high, open, off, value, out);
+        open = kernel_take_root_newton_step(rays, map, low, high, open, off, value, out);
     }
     const vm close = vm_andnot(wanted, open);
-    if (vm_any(close)) kernel_polish_last(rays, map, close, low, high, out);
+    if (vm_any(close)) kernel_take_last_newton_step(rays, map, close, low, high, out);
     return open;
 }
 
@@ -506,7 +507,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
  * bracketing. */
 static __attribute__((noinline, unused)) void kernel_refine_roots(const kernel_search *s, kernel_point *out)
 {
-    const vm open = kernel_polish_lanes(&s->rays, &s->map, s->found, &s->low, &s->high, out);
+    const vm open = kernel_refine_roots_by_newton(&s->rays, &s->map, s->found, &s->low, &s->high, out);
     if (vm_any(open)) kernel_refine_by_bracketing(s, open, out);
 }
 

@@ -215,12 +215,12 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
     kernel_contraction contraction;
     kernel_contraction_set_ray(c, rays, lane, &contraction);
     kernel_contraction_set_cell(c->bounds, lane, type, &contraction);
-    kernel_contract(&contraction, wanted, out, none, type);
+    kernel_find_only_root_by_contraction(&contraction, wanted, out, none, type);
     out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
-/* Computes the only crossing of each ray of a packet in one cell by contraction (kernel_contract()), without
- * intersecting the cell's faces. */
+/* Computes the only crossing of each ray of a packet in one cell by contraction
+ * (kernel_find_only_root_by_contraction()), without intersecting the cell's faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
                                                              vm wanted, kernel_point *out, vm *none)
 {

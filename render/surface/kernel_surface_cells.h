@@ -129,7 +129,7 @@ SIMD_INLINE unsigned kernel_surface_cells_visible_blocks(const kernel_tile_trace
 /* Completes the queue before its cells are transformed: copies coordinates and values if the mesh part's indices do not
  * fit in 32 bits, and fills the unused lanes with the vertices and the isovalue of the first cell, so that all lanes
  * can be transformed. */
-SIMD_INLINE void kernel_surface_cells_close(const kernel_tile_trace *t, kernel_surface_cells *own)
+SIMD_INLINE void kernel_surface_cells_fill_lanes(const kernel_tile_trace *t, kernel_surface_cells *own)
 {
     if (__builtin_expect(!own->arrays.has_lanes, 0)) kernel_surface_cells_copy(t, own);
     for (int n = own->count; n < SIMD_WIDTH; n++) {

@@ -31,7 +31,7 @@
 
 /* Queues the cells in the list, which the search has found, for tracing, unless nearer hits hide them. Empties the
  * list. It always returns true, as the callback kernel_finder.grow must. */
-static bool kernel_tile_find_flush(kernel_candidate_list *list)
+static bool kernel_queue_found_candidates(kernel_candidate_list *list)
 {
     kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
     kernel_tile_trace *t = s->tile;
@@ -53,10 +53,10 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
 {
     kernel_finder *finder = t->thread->finder;
     if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
-    if (finder->frame) kernel_find_flush(finder);
+    if (finder->frame) kernel_process_all_queued_cells(finder);
     kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
     finder->list = &s->list;
-    finder->grow = kernel_tile_find_flush;
+    finder->grow = kernel_queue_found_candidates;
     finder->first[0] = t->tile.x0;
     finder->first[1] = t->tile.y0;
     const render_camera *c = &t->frame->job->camera;
@@ -146,7 +146,7 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
 
 /* Tests the nodes by six of the tile's planes and by the surface's isovalues, and computes the results in *nodes.
  * Returns a mask of the lanes whose nodes may be visible. */
-SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_node_lanes *nodes)
+SIMD_INLINE unsigned kernel_test_node_visibility(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
     enum { LEFT, RIGHT, TOP, BOTTOM, DEPTH, ALONG, PLANES };
     static const int plane[PLANES] = {0,
@@ -191,8 +191,9 @@ SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_no
 
 /* Pushes a node on the stack if its lane's bit is set in `visible`, and prefetches what is read next. Returns the
  * number of nodes pushed, 0 or 1. */
-SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
-                                      const kernel_node_lanes *nodes, unsigned visible, int lane, kernel_tile_node *to)
+SIMD_INLINE int kernel_push_visible_node(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
+                                         const kernel_node_lanes *nodes, unsigned visible, int lane,
+                                         kernel_tile_node *to)
 {
     if (!(visible >> lane & 1)) return 0;
     const int64_t ref = mmbvh_node_ref(tree, node);
@@ -223,11 +224,11 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
         node[2 * n + 1] = node[2 * n] + 1;
     }
     kernel_nodes_fetch(tree, ranges, node, &lanes);
-    const unsigned visible = kernel_tile_find_test(t, &lanes);
+    const unsigned visible = kernel_test_node_visibility(t, &lanes);
     for (int n = 2 * (count - 1); n >= 0; n -= 2) {
         const int far = lanes.along[n] < lanes.along[n + 1];
-        top += kernel_tile_find_push(tree, ranges, node[n + far], &lanes, visible, n + far, stack + top);
-        top += kernel_tile_find_push(tree, ranges, node[n + !far], &lanes, visible, n + !far, stack + top);
+        top += kernel_push_visible_node(tree, ranges, node[n + far], &lanes, visible, n + far, stack + top);
+        top += kernel_push_visible_node(tree, ranges, node[n + !far], &lanes, visible, n + !far, stack + top);
     }
     return top;
 }
@@ -251,7 +252,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             if (!kernel_box_has_pixel_not_hidden_at(t, e.place, e.near)) continue;
             if (e.count) {
                 kernel_tile_find_set_part(t, t->search, part);
-                kernel_find_leaf(t->thread->finder, tree->cells + e.ref, e.count);
+                kernel_queue_leaf_cells(t->thread->finder, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -263,7 +264,8 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
 /* ---- surfaces ---- */
 
 /* Finds the cells of the given mesh parts; a callback for a leaf of the tree over all parts. */
-static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
+static void kernel_find_cells_of_mesh_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
+                                            unsigned blocks)
 {
     (void)unused, (void)blocks;
     for (int n = 0; n < count; n++) kernel_tile_find_cells(t, (int)parts[n]);
@@ -275,15 +277,15 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
     if (job->parent) {
-        kernel_tile_traverse(t, job->parent, NULL, NULL, t->traced_blocks, 0, kernel_tile_parts);
+        kernel_tile_traverse(t, job->parent, NULL, NULL, t->traced_blocks, 0, kernel_find_cells_of_mesh_parts);
         return;
     }
     for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
-        kernel_tile_parts(t, 0, &part, 1, t->traced_blocks);
+        kernel_find_cells_of_mesh_parts(t, 0, &part, 1, t->traced_blocks);
 }
 
 /* Sets the scales and margins from which nodes' boxes of pixels are computed (kernel_node_pixels()). */
-SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
+SIMD_INLINE void kernel_set_pixel_box_scales(kernel_tile_trace *t)
 {
     kernel_tile_search *s = t->search;
     const kernel_frame *f = t->frame;
@@ -303,13 +305,13 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
     s->tile = t;
     s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
     t->thread->finder->frame = NULL;
-    kernel_tile_find_begin(t);
+    kernel_set_pixel_box_scales(t);
     kernel_tile_queue_begin(s);
     for (int layer = 0; layer < t->frame->surface_count; layer++) {
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
-        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
-        kernel_tile_find_flush(&s->list);
+        if (t->thread->finder->frame) kernel_process_all_queued_cells(t->thread->finder);
+        kernel_queue_found_candidates(&s->list);
         kernel_tile_queue_finish(t, s);
     }
 }

@@ -47,7 +47,7 @@ static void grow_box(float box[6], const float *lower, const float *upper)
 
 /* Computes, for all nodes of the binary tree, their boxes and the pieces below them. It goes from the last node to the
  * first, because children have larger indices than their parents. */
-static void sum_up(widening *w)
+static void compute_node_boxes(widening *w)
 {
     for (int64_t node = w->binary->node_count - 1; node >= 0; node--) {
         const int64_t ref = mmbvh_node_ref(w->binary, node), count = mmbvh_node_count(w->binary, node);
@@ -196,7 +196,7 @@ static bool widen(widening *w)
     w->boxes = base_alloc(nodes * 6 * sizeof *w->boxes);
     const bool is_well = w->first && w->count && w->boxes && reserve(w, nodes, nodes + 1);
     if (is_well) {
-        sum_up(w);
+        compute_node_boxes(w);
         const piece_range all = node_range(w, 0);
         make_node(w, &all);
         count_used_bytes(w);

@@ -219,8 +219,8 @@ SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pa
 /* Sets p->count, the number of segments of each ray; returns the rays for which no number of segments is accurate
  * enough. It first tests whether one segment is accurate enough, with the bounds over all of the cell's values, and the
  * error that is allowed for the ray's length alone. Only other rays use kernel_local_count_by_depth(). */
-SIMD_INLINE vm kernel_local_count(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
-                                  kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_choose_segment_counts(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
+                                                  kernel_local_pairs *p)
 {
     const kernel_pieces *pieces = &f->pieces[volume];
     const vi lane = p->rays.lane;

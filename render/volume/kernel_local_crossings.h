@@ -107,8 +107,8 @@ static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const ke
                                                                         const vi *nonconvex, vm rays, int type, vm *two,
                                                                         vm *alone, vi face[2])
 {
-    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex, rays, two, alone,
-                   face);
+    KERNEL_OF_TYPE(type, kernel_curved_find_crossed_faces, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex,
+                   rays, two, alone, face);
 }
 
 /* Finds the rays that cross exactly two faces of their cells once each (*two), and the indices of these faces. Rays for
@@ -120,7 +120,8 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells,
     if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
         kernel_local_find_faces_nonconvex(cells, own, &nonconvex, rays, type, two, alone, face);
     else
-        kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
+        kernel_curved_find_crossed_faces((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face,
+                                         type);
 }
 
 /* Reads the corners of the two faces that each ray crosses, if the given rays have at most two different cells. One

@@ -265,8 +265,8 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
 }
 
 /* Evaluates the field at the five places of a whole interval. */
-SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kernel_point ends[2], vm rays, int type,
-                                        kernel_local_places *out)
+SIMD_INLINE void kernel_local_sample_whole_interval(const kernel_local_chord *c, const kernel_point ends[2], vm rays,
+                                                    int type, kernel_local_places *out)
 {
     out->u = -0.5f;
     out->width = 1;
@@ -347,7 +347,7 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     kernel_local_chord chord;
     kernel_local_places places;
     kernel_local_chord_of(cells, bounds, p->rays.lane, p->ends, type, &chord);
-    kernel_local_places_of(&chord, p->ends, p->active, type, &places);
+    kernel_local_sample_whole_interval(&chord, p->ends, p->active, type, &places);
     p->has_diverged = vm_not(places.is_known);
     p->residual = places.residual;
     for (int i = 0; i < 3; i++) p->field[i] = places.off[i + 1];

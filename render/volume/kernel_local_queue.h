@@ -235,7 +235,7 @@ SIMD_INLINE unsigned kernel_local_begin_vector(kernel_tile_cells *cells, kernel_
 }
 
 /* Removes the first SIMD_WIDTH cells from the queue and moves the rest to its begin. */
-SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
+SIMD_INLINE void kernel_local_queue_remove_vector(kernel_local_queue *q)
 {
     enum { LEFT = KERNEL_LOCAL_ROOM - SIMD_WIDTH };
     q->count = q->count > SIMD_WIDTH ? q->count - SIMD_WIDTH : 0;

@@ -185,7 +185,7 @@ SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_tile_volume 
 }
 
 /* Computes the values of all listed samples, and empties the list. */
-static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, int type)
+static __attribute__((noinline)) void kernel_local_compute_samples(kernel_tile_trace *t, int type)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
     if (!b->sample_count) return;
@@ -213,7 +213,7 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
                               &last);
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(rays.active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
-        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, type);
+        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_compute_samples(t, type);
         const vi whole = vi_from_vf(number);
         const vf place = base + step * vf_from_vi(whole + b->first);
         vf_compress(b->bits + b->sample_count, more, vf_from_bits(key | whole << KERNEL_LOCAL_NUMBER));

@@ -147,7 +147,7 @@ SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
 }
 
 /* Adds the rays' intervals as one segment each, raised so that its mean is that of the field. */
-SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_add_single_segments(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
     kernel_local_store_segments(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), t0, t1,
@@ -156,8 +156,8 @@ SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_loc
 
 /* Adds the segments of rays that need several (p->count): equal subintervals of the interval, on each of which the
  * segment has the mean of the polynomial through the sampled values. */
-static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segments *b, const kernel_local_pairs *p,
-                                                                vm rays)
+static __attribute__((noinline)) void kernel_local_add_equal_segments(kernel_tile_segments *b,
+                                                                      const kernel_local_pairs *p, vm rays)
 {
     const vf *d = p->field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value, v1 = p->ends[1].value;
     const vf share = 1.0f / p->count, length = t1 - t0, rise = v1 - v0, middle = 4.0f * d[1];
@@ -185,8 +185,8 @@ static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segm
 SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
-    kernel_local_emit_one(b, p, single);
-    if (vm_any(more)) kernel_local_emit_several(b, p, more);
+    kernel_local_add_single_segments(b, p, single);
+    if (vm_any(more)) kernel_local_add_equal_segments(b, p, more);
 }
 
 /* ---- parts of an interval ---- */
@@ -195,7 +195,7 @@ static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places
                                                  const vf reach[2], float share);
 
 /* Adds the segments of the rays' intervals. An interval is halved, and its parts again, until the error bounds allow a
- * part to be divided into a few equal segments (kernel_local_count()). The shortest parts for which
+ * part to be divided into a few equal segments (kernel_local_choose_segment_counts()). The shortest parts for which
  * they do not allow it are passed on: from vectors of cells to packets, and from packets to bisection in double. */
 SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
                                                const kernel_local_chord *chord, const kernel_local_pairs *whole,
@@ -204,13 +204,14 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
     kernel_tile_segments *b = t->thread->tile_segments;
     kernel_local_places stack[KERNEL_LOCAL_LEVELS + 2];
     vm mine[KERNEL_LOCAL_LEVELS + 2] = {rays};
-    kernel_local_places_of(chord, whole->ends, rays, type, &stack[0]);
+    kernel_local_sample_whole_interval(chord, whole->ends, rays, type, &stack[0]);
     for (int count = 1; count > 0;) {
         const kernel_local_places places = stack[--count];
         kernel_local_pairs part;
         kernel_local_restrict_to_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
-        const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
+        const vm fails =
+            vm_or(kernel_local_choose_segment_counts(t->frame, b->volume, bounds, &part), part.has_diverged);
         const vm good = vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
         kernel_local_emit(b, &part, good);
@@ -431,7 +432,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
     kernel_local_deviations_of(&cells->maps, &b->bounds, &p, type);
     const vm alone = vm_and(p.active, p.has_diverged);
     p.active = vm_andnot(p.active, alone);
-    const vm coarse = vm_and(p.active, kernel_local_count(t->frame, b->volume, &b->bounds, &p));
+    const vm coarse = vm_and(p.active, kernel_local_choose_segment_counts(t->frame, b->volume, &b->bounds, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
     if (__builtin_expect(vm_any(coarse), 0)) kernel_local_segments_parts(t, &p, coarse, type);
     if (__builtin_expect(vm_any(alone), 0))

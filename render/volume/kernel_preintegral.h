@@ -118,8 +118,8 @@ SIMD_INLINE vf kernel_preint_colour_deviation(const kernel_preintegral *t, vf v0
 
 /* Computes the light of a segment between the values a and b, and the bounds of its error. length: in unit distances.
  */
-SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel_preint_end *a,
-                                       const kernel_preint_end *b, vf length, kernel_preint_subinterval *out)
+SIMD_INLINE void kernel_preint_compute_light(const kernel_preintegral *t, const kernel_preint_end *a,
+                                             const kernel_preint_end *b, vf length, kernel_preint_subinterval *out)
 {
     const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
     const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
@@ -164,7 +164,7 @@ static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_prein
         const vm inner = vf_lt(number, count), open = vf_le(number, count);
         kernel_preint_subinterval sub;
         kernel_preint_find(t, vf_select(inner, from->value + rise * number, v_out), &ends[n & 1]);
-        kernel_preint_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &sub);
+        kernel_preint_compute_light(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &sub);
         for (int c = 0; c < 3; c++) all->colour[c] += clear * sub.colour[c];
         all->depth += sub.depth;
         all->error += clear * sub.error;
@@ -226,7 +226,7 @@ SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm ra
     if (vm_any(vm_andnot(rays, vf_eq(begin->value, run->v_in))))
         kernel_preint_find(pieces->preintegral, run->v_in, begin);
     kernel_preint_find(pieces->preintegral, run->v_out, end);
-    kernel_preint_between(pieces->preintegral, begin, end, run->length, &sub);
+    kernel_preint_compute_light(pieces->preintegral, begin, end, run->length, &sub);
     const vm good = vf_le(sub.error + sub.table_error, sub.allowed);
     light = kernel_light_select(good, &sub, &light);
     if (vm_any(vm_andnot(rays, good))) kernel_preint_refine(pieces, vm_andnot(rays, good), begin, run, &sub, &light);

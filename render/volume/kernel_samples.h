@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         const vf opacity = vf_select(has, kernel_opacity_at(&f->volumes[v], place), vf_set(0));
         if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
         const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);
-        kernel_table_at(&f->volumes[v], place, c);
+        kernel_look_up_colour(&f->volumes[v], place, c);
         for (int a = 0; a < 3; a++) sum[a] += absorbed * c[a];
         weight += absorbed;
         all += through * absorbed;

@@ -371,7 +371,7 @@ static __attribute__((noinline)) void kernel_tile_process_queue(kernel_tile_trac
         kernel_tile_process_tets(t, cells, q);
     else
         kernel_tile_process_curved(t, cells, q, type);
-    kernel_local_pop(q);
+    kernel_local_queue_remove_vector(q);
 }
 
 /* Processes all queued cells. */
@@ -415,7 +415,8 @@ static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, 
 
 /* Processes the cells of a tree's leaf, as a callback of the traversal (kernel_tile_visit): queues those that are
  * processed in vectors, and then processes the others one by one. */
-static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+static void kernel_process_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count,
+                                       unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
     const int volume = t->thread->tile_cells->volume;
@@ -440,7 +441,7 @@ static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t
         const int part = (int)parts[n];
         if (field->ranges[part].low)
             kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].visible_values, blocks, part, kernel_volume_leaf);
+                                 &t->frame->volumes[volume].visible_values, blocks, part, kernel_process_volume_leaf);
     }
 }
 

@@ -40,7 +40,7 @@ SIMD_INLINE void kernel_depth_begin_window(kernel_tile_volume *d)
 }
 
 /* Begins a tile. begin: depth t of its first cell, or +inf if that is not known. */
-SIMD_INLINE void kernel_depth_begin(kernel_tile_volume *d, float begin)
+SIMD_INLINE void kernel_begin_tile_light_depth(kernel_tile_volume *d, float begin)
 {
     if (d->has_met) d->dark = d->own_dark;
     d->has_met = false;

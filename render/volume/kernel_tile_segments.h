@@ -48,7 +48,7 @@ static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, const p
     kernel_poly_crossings r;
     kernel_interval piece;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
-    while (kernel_poly_next(&r)) {
+    while (kernel_poly_find_next_interval(&r)) {
         if (!c->is_constant) kernel_poly_prepare_profile(&r);
         kernel_profile_begin(&r, &piece);
         for (;;) {

@@ -60,7 +60,8 @@ static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedr
     kernel_poly_crossings r;
     if (!c) kernel_curved_samples(t, packet, p->active, 0, KERNEL_MAX_GROUP);
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
-    while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, &t->thread->tile_volume->packets[packet], &r);
+    while (kernel_poly_find_next_interval(&r))
+        kernel_polyhedron_interval_fill(p, &t->thread->tile_volume->packets[packet], &r);
 }
 
 /* ---- tets: the results are bit-identical for listed pairs and packets ---- */
@@ -131,7 +132,7 @@ static const kernel_volume_method kernel_volume_by_samples = {
     .process_tets = kernel_tet_samples,
     .transform = kernel_local_transform_lanes,
     .process_pixels = kernel_local_queue_samples,
-    .finish = kernel_local_fill,
+    .finish = kernel_local_compute_samples,
 };
 
 /* Prepares the packet for samples of volumes. Extends the range *first .. *last so that it includes the numbers of all
@@ -236,7 +237,7 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);
-    kernel_depth_begin(v, cells_near);
+    kernel_begin_tile_light_depth(v, cells_near);
     for (int from = first, to; from <= last; from = to) {
         const int samples = kernel_tile_window_samples(v, &t->packets[packets[0]], from);
         to = last - from < samples ? last + 1 : from + samples;

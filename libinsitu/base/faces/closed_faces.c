@@ -92,7 +92,7 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
 
 /* ---- consistent orientation -------------------------------------------------------------------------------------- */
 
-static int find_side_end(const closed_faces *c, int side)
+static int get_end_vertex_of_side(const closed_faces *c, int side)
 {
     const int face = c->face_of[side];
     return c->entry_vertices[side + 1 < c->first_entries[face + 1] ? side + 1 : c->first_entries[face]];
@@ -141,7 +141,7 @@ void closed_faces_orient(closed_faces *c)
     closed_edges_empty(c);
     c->piece_count = 0;
     for (int side = 0; side < c->entry_count; side++) {
-        const int at = closed_edges_find(c, c->entry_vertices[side], find_side_end(c, side));
+        const int at = closed_edges_find(c, c->entry_vertices[side], get_end_vertex_of_side(c, side));
         closed_edge *edge = &c->edges[at];
         c->edge_of[side] = at;
         if (edge->side[0] < 0)

@@ -53,7 +53,7 @@ static int cyclic_index(int start, int step, int i, int count)
     return (start + (step > 0 ? i : count - i)) % count;
 }
 
-static bool is_less(const double (*p)[3], int count, const int one[2], const int other[2])
+static bool is_corner_order_smaller(const double (*p)[3], int count, const int one[2], const int other[2])
 {
     for (int i = 0; i < count; i++) {
         const int sign =
@@ -63,13 +63,13 @@ static bool is_less(const double (*p)[3], int count, const int one[2], const int
     return false;
 }
 
-static void find_order(polygon_work *w, const double (*p)[3])
+static void find_canonical_corner_order(polygon_work *w, const double (*p)[3])
 {
     int best[2] = {0, 1};
     for (int i = 0; i < w->count; i++) {
         if (vector3_compare(p[i], p[best[0]]) > 0) continue;
         for (int step = 1; step >= -1; step -= 2)
-            if (is_less(p, w->count, (const int[2]){i, step}, best)) best[0] = i, best[1] = step;
+            if (is_corner_order_smaller(p, w->count, (const int[2]){i, step}, best)) best[0] = i, best[1] = step;
     }
     for (int i = 0; i < w->count; i++) w->order[i] = cyclic_index(best[0], best[1], i, w->count);
     w->step = best[1];
@@ -176,7 +176,7 @@ static bool are_coincident(const polygon_work *w, int a, int b)
 
 /* The corners `again` and `tip` have the same position. Returns whether one of the two edges at `again` leads into the
  * angle between the two edges from `tip` to its neighbours a and c. */
-static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
+static bool does_edge_enter_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};
     for (int i = 0; i < 2; i++)
@@ -186,10 +186,10 @@ static bool enters_corner(const polygon_work *w, int a, int tip, int c, int agai
     return false;
 }
 
-static bool is_blocked(const polygon_work *w, int a, int tip, int c, int by)
+static bool is_ear_blocked_by_corner(const polygon_work *w, int a, int tip, int c, int by)
 {
     if (are_coincident(w, by, a) || are_coincident(w, by, c)) return false;
-    if (are_coincident(w, by, tip)) return enters_corner(w, a, tip, c, by);
+    if (are_coincident(w, by, tip)) return does_edge_enter_corner(w, a, tip, c, by);
     return compute_triangle_area(w, a, tip, by) >= -line_slack && compute_triangle_area(w, tip, c, by) >= -line_slack &&
            compute_triangle_area(w, c, a, by) >= -line_slack;
 }
@@ -199,7 +199,7 @@ static bool is_ear(const polygon_work *w, int tip)
     const int a = w->previous[tip], c = w->next[tip];
     if (!(compute_triangle_area(w, a, tip, c) > line_slack)) return false;
     for (int by = w->next[c]; by != a; by = w->next[by])
-        if (is_blocked(w, a, tip, c, by)) return false;
+        if (is_ear_blocked_by_corner(w, a, tip, c, by)) return false;
     return true;
 }
 
@@ -246,7 +246,7 @@ void polygon_triangulate(const double (*corners)[3], int count, void *work, int 
 {
     polygon_work w = divide_work(count, work, triangles);
     double normal[3];
-    find_order(&w, corners);
+    find_canonical_corner_order(&w, corners);
     for (int i = 0; i < count; i++) {
         w.next[i] = (i + 1) % count;
         w.previous[i] = (i + count - 1) % count;
@@ -264,6 +264,6 @@ bool polygon_is_concave_quad(const double (*corners)[3])
 {
     double work[4 * 8];
     polygon_work w = divide_work(4, (char *)work, NULL);
-    find_order(&w, corners);
+    find_canonical_corner_order(&w, corners);
     return scale_positions(&w, corners) && is_concave_quad(&w);
 }

@@ -48,7 +48,7 @@ static int find_last_writer(const session_overwrites *all, uint64_t file, int ou
 }
 
 /* Returns the advice at the end of the warning: how to avoid the overwriting. */
-static const char *overwrite_advice(const scene_image *image, const scene_image *before, bool is_same_output)
+static const char *get_overwrite_advice(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
     if (image->variant.source != before->variant.source)
@@ -63,7 +63,7 @@ static void warn_of_overwrite(const session_overwrites *all, const scene *scene,
     session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
                  "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
                  image->name, path, all->last_files[before].cycle, earlier->name, cycle,
-                 overwrite_advice(image, earlier, before == output));
+                 get_overwrite_advice(image, earlier, before == output));
 }
 
 static bool reserve_entries(session_overwrites *all, const scene *scene)

@@ -249,7 +249,7 @@ static bool shows_magnitude(const session_catalogue *catalogue, const scene_fiel
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *found =
-            scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+            scene_field_selects_mesh(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
         if (found && found->component_count > components) components = found->component_count;
     }
     return field->component == SCENE_COMPONENT_MAGNITUDE ||

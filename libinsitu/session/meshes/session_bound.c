@@ -289,7 +289,7 @@ bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool
     const int type = is_pyramid ? GRID_HEX : of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
     *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3,
                            .lattice = session_complete_nodes(type, of->order)};
-    bool is_made = session_make_node_positions(of, order, &out->nodes) && make_levels(out);
+    bool is_made = session_map_nodes_to_connectivity(of, order, &out->nodes) && make_levels(out);
     if (is_pyramid && is_made) out->collapse = session_compute_collapse_matrix(of->order);
     is_made = is_made && (out->collapse || !is_pyramid);
     is_lobatto = is_lobatto && !is_pyramid;
@@ -596,7 +596,7 @@ static void bound_isosurface(bound_job *job, session_cell_bound *out)
 /* Returns the root mean square of the lengths of the edges between the cell's corners, divided by the order. */
 static double find_node_distance(const session_bound *of, const double *tuples)
 {
-    const session_shape *shape = session_shape_of(of->nodes.of.type);
+    const session_shape *shape = session_get_cell_shape(of->nodes.of.type);
     double sum = 0;
     for (int e = 0; e < shape->edge_count; e++)
         for (int x = 0; x < 3; x++) {
@@ -610,7 +610,7 @@ static double find_node_distance(const session_bound *of, const double *tuples)
 /* Estimates the cell's volume from the mean edge along each axis of the reference cell. */
 static double find_volume(const session_bound *of, const double *tuples)
 {
-    const session_shape *shape = session_shape_of(of->nodes.of.type);
+    const session_shape *shape = session_get_cell_shape(of->nodes.of.type);
     const int type = of->nodes.of.type;
     const double share = type == GRID_TET ? 1.0 / 6 : type == GRID_PYRAMID ? 1.0 / 3 : type == GRID_WEDGE ? 1.0 / 2 : 1;
     double axes[3][3] = {{0}}, cross[3];

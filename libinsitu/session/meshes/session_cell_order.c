@@ -101,7 +101,7 @@ static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries
     for (int i = 0; i < count; i++) session_store_index(out, first + i, vertices[i]);
 }
 
-void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
+void session_permute_corners_of_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
 {
 #pragma omp parallel num_threads(threads)
     {
@@ -127,7 +127,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
         for (int64_t i = 0; i < rows.count; i++) session_store_index(&t->connectivity, i, read_entry(&rows, i));
         region_leave();
     }
-    session_permute_cells(mesh, rows.count, threads, &t->connectivity);
+    session_permute_corners_of_cells(mesh, rows.count, threads, &t->connectivity);
     t->has_own_order = true;
     t->connectivity_count = rows.count;
     t->cell_bytes = (rows.count + 1) * t->connectivity.stride;

@@ -18,6 +18,6 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
 
 /* Changes the order of the entries of `out` within each cell, in place, from the caller's vertex order to VTK's. `out`
  * has one entry for each vertex of each cell, `entries` in total. A second call restores the caller's order. */
-void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
+void session_permute_corners_of_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
 
 #endif

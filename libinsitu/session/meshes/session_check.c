@@ -407,7 +407,7 @@ static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, i
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
-    const tally_run run = tally_choose_run(mesh);
+    const tally_run run = tally_choose_check_function(mesh);
     int64_t first_bad = count;
     if (tally_lattice_by_axes(mesh, tally)) return count;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, count)) reduction(min : first_bad)
@@ -581,7 +581,7 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
         *error = mesh->warp.problem;
         return error->status;
     }
-    session_fill_conformed(mesh, threads);
+    session_convert_arrays(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_compute_axis_coordinates(mesh, error);
     if (!status) status = check_mesh_cells(mesh, threads, error);

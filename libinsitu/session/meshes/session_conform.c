@@ -134,7 +134,7 @@ static void convert_array(const session_conformed *conformed, const conform_arra
     }
 }
 
-void session_fill_conformed(session_mesh *mesh, int threads)
+void session_convert_arrays(session_mesh *mesh, int threads)
 {
     for (int i = 0; i < SESSION_CONFORMED; i++) {
         if (!mesh->conformed.copies[i]) continue;
@@ -197,7 +197,8 @@ static bool replace_array_by_copy(session_conformed *last, bool is_kept, int num
     return out->copies[number] != NULL;
 }
 
-insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *original, unsigned changed, base_error *error)
+insitu_status session_allocate_converted_arrays(session_mesh *mesh, const insitu_mesh *original, unsigned changed,
+                                                base_error *error)
 {
     session_conformed made = {0};
     insitu_mesh given = *original;

@@ -272,7 +272,7 @@ void session_drop_derivatives(session_derivatives *derivatives)
 
 /* ---- derivatives of all cells of a mesh -------------------------------------------------------------------------- */
 
-bool session_has_two_spacings(const session_nodes *of)
+bool session_may_have_lobatto_nodes(const session_nodes *of)
 {
     return of->order > 2 && (of->type == GRID_HEX || of->type == GRID_QUAD);
 }
@@ -310,7 +310,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
         const session_nodes *of = &out->rows.kinds[i].nodes;
         is_made = session_make_derivatives(of, out->order, false, 1, &out->kinds[2 * i]);
-        if (is_made && session_has_two_spacings(of))
+        if (is_made && session_may_have_lobatto_nodes(of))
             is_made = session_make_derivatives(of, out->order, true, 1, &out->kinds[2 * i + 1]);
     }
     return is_made;
@@ -363,7 +363,7 @@ const session_derivatives *session_find_derivatives_of_cell(const session_polyno
     const int kind = session_find_kind_of_cell(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
-    if (!session_has_two_spacings(of)) return equispaced;
+    if (!session_may_have_lobatto_nodes(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
     return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

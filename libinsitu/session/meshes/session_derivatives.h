@@ -31,7 +31,7 @@ void session_drop_derivatives(session_derivatives *derivatives);
 
 /* Returns whether the cell's nodes may be equispaced or Gauss-Lobatto points, which differ in hexes and quads of order
  * 3 and more. */
-bool session_has_two_spacings(const session_nodes *of);
+bool session_may_have_lobatto_nodes(const session_nodes *of);
 
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
 void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);

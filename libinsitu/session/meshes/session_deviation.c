@@ -125,19 +125,19 @@ static session_cell_bound bound_cell(const deviation_work *w, const session_boun
 /* Returns the largest surface error that is reported for a cell: half the distance between two nodes, plus the error of
  * positions. Half the distance is the error if the exact surface between two nodes is half a circle. If a surface bends
  * more, the nodes do not resolve it. */
-static double limit_error(const session_cell_bound *bound)
+static double find_largest_reported_error(const session_cell_bound *bound)
 {
     return 0.5 * bound->node_distance + bound->position_error;
 }
 
 /* Returns a bound of the isosurfaces' error in a cell. Successively finer lattices are used while the bound exceeds
- * `enough` or limit_error(). `first` contains the bounds from the coarsest lattice. */
+ * `enough` or find_largest_reported_error(). `first` contains the bounds from the coarsest lattice. */
 static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
                                  const session_cell_bound *first, double *buffer)
 {
     double least = first->surface_error;
     for (int level = 1; level < of->level_count; level++)
-        if (!(least <= enough && least <= limit_error(first)))
+        if (!(least <= enough && least <= find_largest_reported_error(first)))
             least = fmin(least, bound_cell(w, of, cell, level, buffer).surface_error);
     return least;
 }
@@ -192,9 +192,9 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, 
     if (w->request->values) {
         error = find_surface_error(w, of, cell, out->error * size, &bound, buffer);
         out->cell_count++;
-        out->unbounded_count += error > limit_error(&bound);
+        out->unbounded_count += error > find_largest_reported_error(&bound);
         out->area += estimate_area(&bound, &of->nodes.of, size);
-        error = fmin(error, limit_error(&bound));
+        error = fmin(error, find_largest_reported_error(&bound));
     }
     out->error = fmax(out->error, error / size);
 }

@@ -300,7 +300,7 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
         const session_nodes *nodes = &of->rows.kinds[kind].nodes;
         const int64_t first = session_row_first(&of->rows, cell);
         cells[kind]++;
-        if (!session_has_two_spacings(nodes)) continue;
+        if (!session_may_have_lobatto_nodes(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
             grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), positions[n]);
         counts[session_find_derivatives_of_cell(of, cell, positions[0], 3) == &of->kinds[2 * kind] ? EQUISPACED
@@ -391,7 +391,7 @@ insitu_status session_count_higher_order_cells(session_meshes *meshes, const ses
 
 /* ---- marks of refined cells -------------------------------------------------------------------------------------- */
 
-bool session_begin_marks(session_finer_choice *choice, const session_parts *parts)
+bool session_allocate_cell_marks(session_finer_choice *choice, const session_parts *parts)
 {
     choice->marks = base_calloc((size_t)parts->count + 1, sizeof *choice->marks);
     bool is_made = choice->marks;

@@ -64,7 +64,7 @@ insitu_status session_count_higher_order_cells(session_meshes *meshes, const ses
 
 /* Allocates the arrays of marks for all parts of the mesh, without a marked cell. Only marked cells are refined; in a
  * mesh for which this function has not been called, all cells are. Returns false if memory runs out. Local. */
-bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
+bool session_allocate_cell_marks(session_finer_choice *choice, const session_parts *parts);
 
 /* Returns the marks of the part of the mesh with this index; NULL: all of the part's cells are refined. */
 static inline session_cell_marks *session_get_marks_of_part(const session_finer_choice *choice, int part)

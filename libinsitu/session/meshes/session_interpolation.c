@@ -52,7 +52,7 @@ static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
 }
 
 /* Computes B_n(t), as defined in session_derivatives.c. */
-static double find_product(int n, double t)
+static double evaluate_silvester_polynomial(int n, double t)
 {
     double value = 1;
     for (int m = 0; m < n; m++) value = value * (t - m) / (m + 1);
@@ -70,9 +70,10 @@ static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
                 for (int c = 0; c <= (is_tet ? p : 0); c++)
                     for (int b = 0; b <= p - c; b++)
                         for (int a = 0; a <= p - c - b; a++)
-                            *out++ = find_product(a, (double)i / parts) * find_product(b, (double)j / parts) *
-                                     find_product(c, (double)k / parts) *
-                                     find_product(p - a - b - c, (double)(fine - i - j - k) / parts);
+                            *out++ = evaluate_silvester_polynomial(a, (double)i / parts) *
+                                     evaluate_silvester_polynomial(b, (double)j / parts) *
+                                     evaluate_silvester_polynomial(c, (double)k / parts) *
+                                     evaluate_silvester_polynomial(p - a - b - c, (double)(fine - i - j - k) / parts);
 }
 
 /* ---- pyramids ---- */
@@ -255,7 +256,7 @@ static void add_side(session_interpolation_sides *sides, const signed char *corn
 
 static bool list_sides(session_interpolation *out, session_interpolation_sides *sides)
 {
-    const session_shape *shape = session_shape_of(out->of.type);
+    const session_shape *shape = session_get_cell_shape(out->of.type);
     sides->turn_count = sides->corner_count == 2 ? 2 : 2 * sides->corner_count;
     sides->node_count = count_side_nodes(sides->corner_count, out->complete.order);
     sides->fine_count = count_side_nodes(sides->corner_count, out->fine.order);
@@ -274,7 +275,7 @@ static bool list_sides(session_interpolation *out, session_interpolation_sides *
 
 static bool list_all_sides(session_interpolation *out)
 {
-    const session_shape *shape = session_shape_of(out->of.type);
+    const session_shape *shape = session_get_cell_shape(out->of.type);
     session_interpolation_sides *quads = &out->sides[0], *triangles = &out->sides[1], *edges = &out->sides[2];
     quads->corner_count = 4;
     triangles->corner_count = 3;
@@ -311,7 +312,7 @@ static bool list_own_nodes(session_interpolation *out, int parts)
     return out->own;
 }
 
-bool session_make_node_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
+bool session_map_nodes_to_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     *out = (session_interpolation){.of = *of, .complete = session_complete_nodes(of->type, of->order)};
     out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
@@ -322,7 +323,7 @@ bool session_make_node_positions(const session_nodes *of, insitu_vertex_order or
 bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
                                 session_interpolation *out)
 {
-    if (!session_make_node_positions(of, order, out)) return false;
+    if (!session_map_nodes_to_connectivity(of, order, out)) return false;
     out->fine = session_complete_nodes(of->type, parts * of->order);
     return make_weights(of, parts, is_lobatto, out) && list_all_sides(out) && list_own_nodes(out, parts);
 }
@@ -550,7 +551,7 @@ void session_interpolate(const session_interpolation *of, const double (*corners
     job.spare[1] = job.spare[0] + spare_count(of) * components;
     session_complete_tuples(of, components, tuples, work);
     fill_all_fine_nodes(&job);
-    rank_corners(session_shape_of(of->of.type)->corner_count, corners, ranks);
+    rank_corners(session_get_cell_shape(of->of.type)->corner_count, corners, ranks);
     for (int n = 0; n < INTERPOLATION_SIDES; n++)
         if (of->sides[n].count > 0) fill_side_nodes(&job, &of->sides[n], ranks);
     for (int n = 0; n < of->own_count; n++)

@@ -64,7 +64,7 @@ void session_drop_interpolation(session_interpolation *interpolation);
 
 /* Fills in only the members that session_complete_tuples() needs, without fine nodes and weights. Returns false if
  * memory runs out. */
-bool session_make_node_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
+bool session_map_nodes_to_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
 
 /* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order
  * p whose upper face is collapsed to the apex. A pyramid's functions are polynomials of order p along each axis of that

@@ -398,7 +398,7 @@ void session_drop_contents(session_mesh *mesh)
     session_drop_fields(mesh);
 }
 
-void session_refuse_mesh(session_mesh *mesh)
+void session_drop_data_of_invalid_mesh(session_mesh *mesh)
 {
     drop_cells(mesh);
     session_drop_derived(mesh);

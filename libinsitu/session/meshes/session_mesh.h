@@ -577,7 +577,7 @@ void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 /* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
  * still refer to the mesh. */
-void session_refuse_mesh(session_mesh *mesh);
+void session_drop_data_of_invalid_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
 /* Iterator over the meshes of this rank that pictures may show: the caller's meshes, then the meshes built on their

@@ -270,7 +270,7 @@ static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *err
     if (!session_describe_nodes(type, nodes, &of))
         return base_fail(error, INSITU_ERROR_MESH, "cells of type %d have %lld nodes, which no order from 1 to %d has",
                          type, nodes, NODES_MOST_ORDER);
-    const char *why = session_explain_refused_order(&of, mesh->vertex_order);
+    const char *why = session_describe_unsupported_node_order(&of, mesh->vertex_order);
     if (!why) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH, "cells of type %d and order %d: vertex_order is %d: %s", type, of.order,
                      (int)mesh->vertex_order, why);
@@ -380,7 +380,7 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
     changed |= find_description_changes(mesh, given);
     if (changed & INSITU_CHANGED_GEOMETRY && (mesh->topology.depends_on_coordinates || mesh->finer.parts))
         changed |= INSITU_CHANGED_TOPOLOGY;
-    if (session_conform_mesh(mesh, given, changed, error)) return;
+    if (session_allocate_converted_arrays(mesh, given, changed, error)) return;
     restore_finer_lattices(mesh, changed);
     if (drops_fields) {
         session_drop_fields(mesh);
@@ -438,7 +438,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     if (check_mesh(given, &what) == INSITU_OK) session_store_mesh(meshes, mesh, given, &what);
     if (!what.status) return INSITU_OK;
     meshes->are_levels_changed = meshes->are_levels_changed || had_levels;
-    session_refuse_mesh(mesh);
+    session_drop_data_of_invalid_mesh(mesh);
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;
     mesh->problem = (base_error){0};

@@ -156,7 +156,7 @@ session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, 
     const unsigned changed = find_changes(image, planes);
     if (changed == INSITU_CHANGED_NOTHING) return image;
     base_error problem = {.status = INSITU_OK};
-    if (source->is_check_stale) session_fill_conformed(source, threads);
+    if (source->is_check_stale) session_convert_arrays(source, threads);
     if (!mirror_coordinates(image, planes, changed, threads))
         session_fail_for_memory(&problem, session_nodal_mesh(source)->vertex_count * 24,
                                 "coordinates of a mirrored mesh");

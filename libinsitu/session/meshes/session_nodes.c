@@ -90,7 +90,7 @@ int64_t session_count_cell_nodes(const insitu_mesh *mesh)
     return mesh->cell_count ? mesh->connectivity_count / mesh->cell_count : 0;
 }
 
-const char *session_explain_refused_order(const session_nodes *of, insitu_vertex_order order)
+const char *session_describe_unsupported_node_order(const session_nodes *of, insitu_vertex_order order)
 {
     if (order == INSITU_ORDER_DMPLEX) return "DMPlex's order is known for linear cells alone";
     if (order == INSITU_ORDER_LEXICOGRAPHIC && !of->is_complete)
@@ -277,7 +277,7 @@ static const signed char *quadratic_permutation(int type, insitu_vertex_order or
                                   : NULL;
 }
 
-int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n)
+int session_convert_quadratic_node_index(const session_nodes *of, insitu_vertex_order order, int n)
 {
     const int corners = grid_type_vertices(of->type);
     const signed char *turn = n < corners || of->order != 2 ? NULL : quadratic_permutation(of->type, order);
@@ -288,12 +288,12 @@ int session_node_index(const session_nodes *of, insitu_vertex_order order, int i
 {
     if (order == INSITU_ORDER_LEXICOGRAPHIC) return number_lexicographic_node(of->type, of->order, i, j, k);
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
-    return session_quadratic_index(of, order, number_vtk_node(of, is_old, i, j, k));
+    return session_convert_quadratic_node_index(of, order, number_vtk_node(of, is_old, i, j, k));
 }
 
 void session_find_corners(const session_nodes *of, insitu_vertex_order order, int out[8])
 {
-    const session_shape *shape = session_shape_of(of->type);
+    const session_shape *shape = session_get_cell_shape(of->type);
     const int p = of->order;
     for (int c = 0; c < shape->corner_count; c++) {
         const signed char *at = shape->corners[c];

@@ -42,7 +42,7 @@ session_nodes session_complete_nodes(int corner_type, int order);
 int64_t session_node_count(int type, int order);
 
 /* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */
-const char *session_explain_refused_order(const session_nodes *of, insitu_vertex_order order);
+const char *session_describe_unsupported_node_order(const session_nodes *of, insitu_vertex_order order);
 
 /* Returns the position, in the cell's list of nodes in the connectivity, of the node with the lattice indices i, j, k.
  * The axes of the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i
@@ -57,7 +57,7 @@ void session_find_corners(const session_nodes *of, insitu_vertex_order order, in
 bool session_has_node(const session_nodes *of, int i, int j, int k);
 
 /* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */
-int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);
+int session_convert_quadratic_node_index(const session_nodes *of, insitu_vertex_order order, int n);
 
 /* Returns the number of nodes of each cell of a mesh of one type, or 0 if the description does not determine it. */
 int64_t session_count_cell_nodes(const insitu_mesh *mesh);

@@ -47,7 +47,7 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 
 /* Adds a piece. Each of its vertices is the node with the lattice indices `at`, plus 0 or 1 along each axis: bit n of
  * the vertex's entry in `steps` is the offset along axis n. */
-static void add_steps(const pattern_list *list, int type, const int at[3], const signed char *steps)
+static void add_piece_by_corner_offsets(const pattern_list *list, int type, const int at[3], const signed char *steps)
 {
     int nodes[GRID_MAX_CELL_VERTICES][3];
     for (int n = 0; n < grid_type_vertices(type); n++)
@@ -55,24 +55,25 @@ static void add_steps(const pattern_list *list, int type, const int at[3], const
     add_piece(list, type, (const int(*)[3])nodes);
 }
 
-static void list_boxes(const pattern_list *list, int p)
+static void list_pieces_of_hex_or_quad(const pattern_list *list, int p)
 {
     static const signed char box[] = {0, 1, 3, 2, 4, 5, 7, 6};
     const bool is_hex = list->out->nodes.type == GRID_HEX;
     for (int k = 0; k < (is_hex ? p : 1); k++)
         for (int j = 0; j < p; j++)
-            for (int i = 0; i < p; i++) add_steps(list, is_hex ? GRID_HEX : GRID_QUAD, (const int[]){i, j, k}, box);
+            for (int i = 0; i < p; i++)
+                add_piece_by_corner_offsets(list, is_hex ? GRID_HEX : GRID_QUAD, (const int[]){i, j, k}, box);
 }
 
-static void list_prisms(const pattern_list *list, int p)
+static void list_pieces_of_wedge_or_triangle(const pattern_list *list, int p)
 {
     static const signed char up[] = {0, 1, 2, 4, 5, 6}, down[] = {1, 3, 2, 5, 7, 6};
     const int type = list->out->nodes.type;
     for (int k = 0; k < (type == GRID_WEDGE ? p : 1); k++)
         for (int j = 0; j < p; j++)
             for (int i = 0; i + j < p; i++) {
-                add_steps(list, type, (const int[]){i, j, k}, up);
-                if (i + j + 1 < p) add_steps(list, type, (const int[]){i, j, k}, down);
+                add_piece_by_corner_offsets(list, type, (const int[]){i, j, k}, up);
+                if (i + j + 1 < p) add_piece_by_corner_offsets(list, type, (const int[]){i, j, k}, down);
             }
 }
 
@@ -84,9 +85,9 @@ static void list_tets(const pattern_list *list, int p)
         for (int j = 0; j + k < p; j++)
             for (int i = 0; i + j + k < p; i++) {
                 const int at[3] = {i, j, k}, left = p - 1 - i - j - k;
-                add_steps(list, GRID_TET, at, up);
-                for (int n = 0; n < 4 && left > 0; n++) add_steps(list, GRID_TET, at, octahedron[n]);
-                if (left > 1) add_steps(list, GRID_TET, at, down);
+                add_piece_by_corner_offsets(list, GRID_TET, at, up);
+                for (int n = 0; n < 4 && left > 0; n++) add_piece_by_corner_offsets(list, GRID_TET, at, octahedron[n]);
+                if (left > 1) add_piece_by_corner_offsets(list, GRID_TET, at, down);
             }
 }
 
@@ -116,9 +117,9 @@ static void list_pieces(const pattern_list *list)
     list->out->piece_count = list->out->piece_size = 0;
     switch (list->out->nodes.type) {
     case GRID_HEX:
-    case GRID_QUAD: list_boxes(list, p); break;
+    case GRID_QUAD: list_pieces_of_hex_or_quad(list, p); break;
     case GRID_WEDGE:
-    case GRID_TRIANGLE: list_prisms(list, p); break;
+    case GRID_TRIANGLE: list_pieces_of_wedge_or_triangle(list, p); break;
     case GRID_TET: list_tets(list, p); break;
     default: list_pyramids(list, p); break;
     }
@@ -186,7 +187,7 @@ static void orient_outwards(const session_shape *shape, pattern_polygon *p)
  * (session_pattern.h). */
 static void find_polygons(session_pattern *out, insitu_vertex_order order)
 {
-    const session_shape *shape = session_shape_of(out->nodes.type);
+    const session_shape *shape = session_get_cell_shape(out->nodes.type);
     const int corners = shape->corner_count;
     for (int c = 0; c < corners; c++) add_cut(out, shape, c);
     for (int f = 0; f < shape->face_count; f++) {
@@ -198,11 +199,12 @@ static void find_polygons(session_pattern *out, insitu_vertex_order order)
     for (int i = 0; i < out->polygon_count; i++) {
         pattern_polygon *p = &out->polygons[i];
         if (p->count > 2 && shape->type != GRID_QUAD) orient_outwards(shape, p);
-        for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_index(&out->nodes, order, p->nodes[n]);
+        for (int n = 0; n < p->count; n++)
+            p->nodes[n] = session_convert_quadratic_node_index(&out->nodes, order, p->nodes[n]);
     }
     out->midpoint_count = shape->edge_count;
     for (int e = 0; e < out->midpoint_count; e++)
-        out->midpoints[e] = session_quadratic_index(&out->nodes, order, corners + e);
+        out->midpoints[e] = session_convert_quadratic_node_index(&out->nodes, order, corners + e);
 }
 
 /* Splits a polygon into triangles of the same orientation by the diagonals from the node that comes first in the order

@@ -228,7 +228,7 @@ insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session
  * session_shape.faces[f]. */
 static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
 {
-    const session_shape *shape = session_shape_of(fine->type);
+    const session_shape *shape = session_get_cell_shape(fine->type);
     for (int k = 0; k <= fine->order; k++)
         for (int j = 0; j <= fine->order; j++)
             for (int i = 0; i <= fine->order; i++)

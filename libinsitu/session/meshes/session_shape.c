@@ -36,7 +36,7 @@ static const session_shape hex = {
     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
     {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}}};
 
-const session_shape *session_shape_of(int type)
+const session_shape *session_get_cell_shape(int type)
 {
     switch (type) {
     case GRID_TRIANGLE: return &triangle;

@@ -18,7 +18,7 @@ typedef struct session_shape {
 } session_shape;
 
 /* Returns the shape of a linear type. */
-const session_shape *session_shape_of(int type);
+const session_shape *session_get_cell_shape(int type);
 
 /* Computes a normal of a face's plane in the reference cell. For triangles and quads, whose reference cell is in the
  * plane z = 0, it is parallel to z. */

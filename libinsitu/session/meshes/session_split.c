@@ -81,7 +81,7 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
     const bool is_linear = nodes.count && nodes.count == count;
     if (!is_linear && !session_describe_nodes(type, count, &nodes))
         return describe_type(w->mesh, cell, type, count, error);
-    const char *why = is_linear ? NULL : session_explain_refused_order(&nodes, order);
+    const char *why = is_linear ? NULL : session_describe_unsupported_node_order(&nodes, order);
     if (why)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld of type %d and order %d: vertex_order is %d: %s", w->mesh->label,

@@ -34,7 +34,7 @@ typedef struct straight_work {
  * cell. */
 static void find_corner_weights(int type, const double at[3], double out[8])
 {
-    const session_shape *shape = session_shape_of(type);
+    const session_shape *shape = session_get_cell_shape(type);
     const int simplex_axes = type == GRID_TET ? 3 : type == GRID_TRIANGLE || type == GRID_WEDGE ? 2 : 0;
     const int axes = type == GRID_TRIANGLE || type == GRID_QUAD ? 2 : 3;
     for (int c = 0; c < shape->corner_count; c++) {
@@ -70,12 +70,12 @@ static bool fill_weights(const session_nodes *of, insitu_vertex_order order, boo
 
 static bool make_linear_positions(const session_nodes *of, insitu_vertex_order order, linear_positions *out)
 {
-    const session_shape *shape = session_shape_of(of->type);
+    const session_shape *shape = session_get_cell_shape(of->type);
     *out = (linear_positions){.of = *of, .corner_count = shape->corner_count};
     if (of->order == 1 || of->type == GRID_PYRAMID) return true;
     session_find_corners(of, order, out->corners);
     return fill_weights(of, order, false, &out->weights[0]) &&
-           (!session_has_two_spacings(of) || fill_weights(of, order, true, &out->weights[1]));
+           (!session_may_have_lobatto_nodes(of) || fill_weights(of, order, true, &out->weights[1]));
 }
 
 static bool begin_work(const insitu_mesh *given, straight_work *w)

@@ -473,7 +473,7 @@ MMBVH_INLINE int64_t tally_cells(const session_mesh *mesh, int64_t begin, int64_
     }
 FETCH_INSTANCES(DEFINE_RUN, tally_cells)
 
-tally_run tally_choose_run(const session_mesh *mesh)
+tally_run tally_choose_check_function(const session_mesh *mesh)
 {
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(tally_cells);
     const grid *g = &mesh->cells;

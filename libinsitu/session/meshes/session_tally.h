@@ -44,6 +44,6 @@ bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally);
 /* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one:
  * there may be polyhedra, all cells are shells of one type, or the coordinates along the three axes differ in type or
  * stride. */
-tally_run tally_choose_run(const session_mesh *mesh);
+tally_run tally_choose_check_function(const session_mesh *mesh);
 
 #endif

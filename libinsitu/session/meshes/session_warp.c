@@ -175,7 +175,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     bool differ = !was_on;
     if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
     session_end_finer_mesh(meshes, mesh); /* finer lattices must be computed again from the moved nodes */
-    if (warp->is_stale) session_fill_conformed(mesh, threads);
+    if (warp->is_stale) session_convert_arrays(mesh, threads);
     restore_coordinates(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {
         if (was_on) mark_moved(meshes, mesh);

@@ -256,7 +256,7 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
 }
 
 /* Bits of the bytes in the array of covered cells. IS_HIDDEN: a finer block covers the whole cell, or the caller marks
- * it as a ghost. IS_CUT: a finer block covers only part of the cell; resolve_cuts() removes this bit. */
+ * it as a ghost. IS_CUT: a finer block covers only part of the cell; report_partly_covered_cells() removes this bit. */
 enum { IS_HIDDEN = 1, IS_CUT = 2 };
 
 /* Iterates over the rows of the cells in an overlap. A row contains the cells with the same indices j and k. */
@@ -357,7 +357,7 @@ static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, 
 /* Reports a misfit if some cell is covered only in part, because this is an error unless another block covers the whole
  * cell. For example, a block that is two levels finer is allowed to begin within a cell if a block of the level in
  * between covers the cell. Then sets all bytes of `covered` to 0 or 1. */
-static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned char *covered)
+static void report_partly_covered_cells(const cover_search *s, session_mesh *mesh, unsigned char *covered)
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
         const int axis = w.cells.cut_axis;
@@ -373,7 +373,7 @@ static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *co
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
     if (!ghosts->data) return;
-    session_fill_conformed(mesh, threads);
+    session_convert_arrays(mesh, threads);
     const grid_array flags = session_grid_array(ghosts);
     const grid g = {
         .ghosts = flags.data, .ghosts_stride = flags.stride, .ghosts_bytes = (int)session_type_size(ghosts->type)};
@@ -388,7 +388,7 @@ static bool update_block(const cover_search *s, session_meshes *meshes, session_
     mesh->misfit = (session_misfit){.exists = false};
     if (!find_covered_cells(s, mesh, &covered, &has_cuts)) return false;
     if (covered) add_caller_ghosts(mesh, s->team->threads, covered);
-    if (has_cuts) resolve_cuts(s, mesh, covered);
+    if (has_cuts) report_partly_covered_cells(s, mesh, covered);
     const bool is_same =
         !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
     if (!is_same) session_drop_cell_data(meshes, mesh);

@@ -22,8 +22,8 @@ void session_face_normals_free(session_face_normals *normals);
 bool session_has_face_normals(session_face_normals *normals, const session_mesh *mesh, int64_t cell);
 
 /* Computes the normal, of any length, of a face of one of the caller's cells at one of the cell's nodes. face: index of
- * the face in the cell (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes
- * of a face point to the same side of the face. Returns false if the normal is 0 or cannot be computed. */
+ * the face in the cell (session_find_face_of_vertices()). vertex: the node, as a vertex of session_mesh.cells. Normals
+ * at all nodes of a face point to the same side of the face. Returns false if the normal is 0 or cannot be computed. */
 bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
                               int64_t vertex, double out[3]);
 

@@ -28,8 +28,8 @@ static const double least_ratio = 1.25;
  * angles. */
 static const double opposite = -0.1;
 
-/* Maximum number of rounds of session_constrain_hanging_vertices(). Several rounds are needed if a corner of a face is
- * itself a hanging vertex on a larger face. */
+/* Maximum number of rounds of session_interpolate_hanging_vertices(). Several rounds are needed if a corner of a face
+ * is itself a hanging vertex on a larger face. */
 enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
@@ -673,8 +673,8 @@ static insitu_status exchange_and_constrain(const session_hanging *hanging, cons
                              "MPI_Allreduce");
 }
 
-insitu_status session_constrain_hanging_vertices(const session_hanging *hanging, const session_team *team,
-                                                 double *means, base_error *error)
+insitu_status session_interpolate_hanging_vertices(const session_hanging *hanging, const session_team *team,
+                                                   double *means, base_error *error)
 {
     insitu_status status = INSITU_OK;
     int is_changed = hanging->total > 0;

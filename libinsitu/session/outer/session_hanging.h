@@ -49,7 +49,7 @@ insitu_status session_update_hanging_vertices(const session_hanging_basis *basis
 /* Sets the value of each hanging vertex to the value interpolated at its position on the face on which it hangs. means:
  * the value of each group of equal vertices. If a value at a corner of the face is not finite, the hanging vertex keeps
  * its value. Collective; all ranks return the same status. */
-insitu_status session_constrain_hanging_vertices(const session_hanging *hanging, const session_team *team,
-                                                 double *means, base_error *error);
+insitu_status session_interpolate_hanging_vertices(const session_hanging *hanging, const session_team *team,
+                                                   double *means, base_error *error);
 
 #endif

@@ -216,7 +216,7 @@ static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
 }
 
 /* Adds a tet on a triangle, or a pyramid on a quad. The apex must have been added before. */
-static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
+static void add_cell_between_face_and_apex(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
     if (w->normals) separate_vertices(w);
     w->out->offsets[w->cell_count] = w->entry_count;
@@ -235,7 +235,8 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     double apex[3];
     if (loop->count < 3) return;
     order_corners(loop);
-    if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
+    if (find_apex(loop, inside, apex))
+        add_cell_between_face_and_apex(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
 /* Computes a triangle of the polygon and the triangle's own apex. Returns false if its area is 0. */
@@ -340,7 +341,7 @@ static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p
 {
     w->parent = w->parents[piece];
     if (w->parent != w->rims.cell) memset(w->rim_loops, 0, sizeof w->rim_loops);
-    w->face = session_find_rim(&w->rims, w->parent, p->vertices, p->count);
+    w->face = session_find_face_of_vertices(&w->rims, w->parent, p->vertices, p->count);
     w->is_curved = w->normals && w->face >= 0 && session_has_face_normals(&w->curved, w->whole, w->parent);
 }
 
@@ -364,7 +365,7 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     const int64_t apex = is_shared ? add_vertex(w, common, p->vertices[p->triangles[0][0]], -1) : -1;
     for (int i = 0; i + 2 < p->count; i++) {
         if (!find_polygon_triangle(p, i, &loop, own)) continue;
-        add_cell_below(w, &loop, is_shared ? apex : add_vertex(w, own, loop.vertices[0], -1), origin);
+        add_cell_between_face_and_apex(w, &loop, is_shared ? apex : add_vertex(w, own, loop.vertices[0], -1), origin);
     }
     add_loop(w, p, first);
 }

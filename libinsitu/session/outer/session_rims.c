@@ -8,14 +8,14 @@
 void session_find_rim_plane(const session_nodes *of, int face, double out[3])
 {
     int plane[3];
-    session_find_face_plane(session_shape_of(of->type), face, plane);
+    session_find_face_plane(session_get_cell_shape(of->type), face, plane);
     for (int axis = 0; axis < 3; axis++) out[axis] = plane[axis];
 }
 
 static void list_rim(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,
                      int *nodes)
 {
-    const session_shape *shape = session_shape_of(of->type);
+    const session_shape *shape = session_get_cell_shape(of->type);
     const int corners = face[3] < 0 ? 3 : 4;
     *count = 0;
     for (int n = 0; n < corners; n++) {
@@ -30,7 +30,7 @@ static void list_rim(const session_nodes *of, insitu_vertex_order order, const s
 
 static bool make_rim_kind(const session_nodes *of, insitu_vertex_order order, session_rim_kind *out)
 {
-    const session_shape *shape = session_shape_of(of->type);
+    const session_shape *shape = session_get_cell_shape(of->type);
     out->faces_of_node = base_calloc((size_t)of->count, 1);
     if (!out->faces_of_node) return false;
     for (int f = 0; f < shape->face_count; f++) list_rim(of, order, shape->faces[f], &out->counts[f], out->nodes[f]);
@@ -100,7 +100,7 @@ unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *ver
     return faces;
 }
 
-int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
+int session_find_face_of_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
 {
     const unsigned faces = session_find_faces(rims, cell, vertices, count);
     return faces ? __builtin_ctz(faces) : -1;

@@ -39,7 +39,7 @@ unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *ver
 
 /* Returns the index of the first face of the caller's cell that contains all of the given vertices, or -1 if there is
  * none. */
-int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
+int session_find_face_of_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 
 /* Computes the normal, of any length, of a face's plane in the reference cell. It is (0, 0, z) for triangles and
  * quads. */

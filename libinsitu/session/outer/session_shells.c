@@ -50,5 +50,6 @@ scene_surface session_make_shell_layer(const scene_isosurface *layer, int height
 
 bool session_is_surface_on_mesh(const scene_surface *layer, const session_mesh *mesh)
 {
-    return scene_field_is_on(&layer->meshes_field, mesh->name) && (!layer->is_of_shells || mesh->has_shells_alone);
+    return scene_field_selects_mesh(&layer->meshes_field, mesh->name) &&
+           (!layer->is_of_shells || mesh->has_shells_alone);
 }

@@ -224,7 +224,7 @@ insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job,
     difference_exchange d = {.comm = comm, .job = job, .list = job->waiting};
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
-    d.round_hits = session_mail_round_size(d.ranks, ROUND_HITS);
+    d.round_hits = session_count_items_per_round(d.ranks, ROUND_HITS);
     const insitu_status status = compute_differences(&d, fragments, error);
     base_free(d.list->items);
     base_free(d.list->shadings);

@@ -270,7 +270,7 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, rend
     lighting l = {.comm = comm, .job = job};
     MPI_Comm_rank(comm, &l.rank);
     MPI_Comm_size(comm, &l.ranks);
-    l.round_hits = session_mail_round_size(l.ranks, ROUND_HITS);
+    l.round_hits = session_count_items_per_round(l.ranks, ROUND_HITS);
     const int64_t most = fragments->count < l.round_hits ? fragments->count : l.round_hits;
     l.fragments = base_alloc((size_t)(most + 1) * sizeof *l.fragments);
     l.hits = base_alloc((size_t)(most + 1) * sizeof *l.hits);

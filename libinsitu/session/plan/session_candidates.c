@@ -68,7 +68,7 @@ static bool mark_data_of_volume(session_mesh *mesh, const scene_volume *layer)
 }
 
 /* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn.
- * This distance is about 0 (session_slice_distance()). */
+ * This distance is about 0 (session_choose_slice_isovalue()). */
 static bool mark_distance_from_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

@@ -128,8 +128,8 @@ static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, c
 {
     if (!is_recentred(w, mesh, input)) return true;
     const int count = session_catalogue_find_field(mesh, input->name)->component_count;
-    const int first = session_needs_vector(w->derived) ? 0 : find_input_component(input, count);
-    const int end = session_needs_vector(w->derived) ? count : first + 1;
+    const int first = session_uses_gradient_of_vector_field(w->derived) ? 0 : find_input_component(input, count);
+    const int end = session_uses_gradient_of_vector_field(w->derived) ? count : first + 1;
     session_mesh_group *mesh_group = session_find_mesh_group(w->basis->catalogue, find_mesh_group_name(mesh, input));
     bool is_done = mesh_group != NULL;
     for (int c = first; c < end && is_done; c++) {
@@ -425,10 +425,12 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
 {
     const scene_derived *derived = w->derived;
     const int first = session_find_field(part, derived->inputs[0].name);
-    const int count = session_needs_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
+    const int count = session_uses_gradient_of_vector_field(derived) ? part->fields[first].given.component_count
+                                                                     : derived->input_count;
     for (int c = 0; c < count; c++)
-        out[c] = find_input_values(w, mesh, part, session_needs_vector(derived) ? 0 : c,
-                                   session_needs_vector(derived) ? c : find_input_component(&derived->inputs[c], 1));
+        out[c] = find_input_values(
+            w, mesh, part, session_uses_gradient_of_vector_field(derived) ? 0 : c,
+            session_uses_gradient_of_vector_field(derived) ? c : find_input_component(&derived->inputs[c], 1));
     return count;
 }
 
@@ -446,7 +448,7 @@ static const session_catalogue_mesh *find_first_mesh_without_fault(const derive_
  * rank's parts, because ranks that have no part of the meshes need it as well. */
 static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
-    if (!session_needs_vector(w->derived)) return w->derived->input_count;
+    if (!session_uses_gradient_of_vector_field(w->derived)) return w->derived->input_count;
     return session_catalogue_find_field(find_first_mesh_without_fault(w, mesh_group), w->derived->inputs[0].name)
         ->component_count;
 }
@@ -465,7 +467,7 @@ static insitu_status begin_sums(const derive_work *w, const session_mesh_group *
             if (!allocate_values(w, v.part, &v.part->fields[v.field_index]))
                 return session_fail_for_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
-    return session_key_all_vertices(sums, error);
+    return session_assign_keys_to_vertices(sums, error);
 }
 
 /* Computes the derived field from gradients on all meshes of a group. Collective. An error of this rank after the last

@@ -6,7 +6,7 @@
 #include "session_agree.h"
 #include "session_events.h"
 
-bool session_needs_vector(const scene_derived *derived)
+bool session_uses_gradient_of_vector_field(const scene_derived *derived)
 {
     return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
 }
@@ -123,7 +123,7 @@ static insitu_status check_components(const derived_on_mesh *at, const scene_fie
                                       const session_catalogue_field *found, base_error *error)
 {
     const int count = found->component_count;
-    if (session_needs_vector(at->derived)) {
+    if (session_uses_gradient_of_vector_field(at->derived)) {
         if (count == 2 || count == 3) return check_other_meshes(at, input, found, error);
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "field \"%s\" has %d component%s on mesh \"%s\", expected a vector of 2 or 3, or a list of "

@@ -28,6 +28,6 @@ void session_mark_source_fields(const scene *scene, uint64_t needed, const sessi
 
 /* Returns whether the derived field is computed from the gradients of all components of a single vector field. Returns
  * false if the scene gives these components as a list of scalars. */
-bool session_needs_vector(const scene_derived *derived);
+bool session_uses_gradient_of_vector_field(const scene_derived *derived);
 
 #endif

@@ -132,8 +132,9 @@ static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, i
 
 static void add_face_range(const session_mesh *mesh, const scene_surface *surface, field_range *range)
 {
-    const session_outer *outer =
-        scene_field_is_on(&surface->meshes_field, mesh->name) ? session_find_outer(mesh, &surface->threshold) : NULL;
+    const session_outer *outer = scene_field_selects_mesh(&surface->meshes_field, mesh->name)
+                                     ? session_find_outer(mesh, &surface->threshold)
+                                     : NULL;
     if (outer && outer->face_count > 0) widen_range(0, 0, range);
 }
 

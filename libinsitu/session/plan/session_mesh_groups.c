@@ -21,7 +21,7 @@ static bool is_group_member(const session_catalogue_mesh *mesh, const group_purp
         return false;
     }
     const session_catalogue_field *found =
-        scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+        scene_field_selects_mesh(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
     return found && session_is_recentred(field, found->centring, mesh->is_refined);
 }
 

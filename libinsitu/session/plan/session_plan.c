@@ -59,7 +59,7 @@ static const base_error *find_fault_of_drawn_mesh(const session_plan_basis *basi
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
-        if (mesh->fault && scene_field_is_on(field, mesh->name)) return mesh->fault;
+        if (mesh->fault && scene_field_selects_mesh(field, mesh->name)) return mesh->fault;
     }
     return NULL;
 }
@@ -129,7 +129,7 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
     bool is_there = false, is_drawable = false;
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
-        if (!scene_name_stands_for(name, mesh->name)) continue;
+        if (!scene_name_selects_mesh(name, mesh->name)) continue;
         if (copy_fault(mesh->fault, error)) return error->status;
         is_there = true;
         is_drawable =
@@ -171,7 +171,7 @@ static insitu_status check_field_on_mesh(const session_plan_basis *basis, const 
 /* Returns the mesh's field if the layer is drawn on the mesh, else NULL. */
 static const session_catalogue_field *find_drawn_field(const session_catalogue_mesh *mesh, const scene_field *field)
 {
-    return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+    return scene_field_selects_mesh(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
 /* Checks that some mesh has the field, and that the field has no fault on the meshes on which the layer is drawn.
@@ -184,7 +184,7 @@ static insitu_status check_field(const session_plan_basis *basis, const scene_fi
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         const session_catalogue_field *shown =
-            scene_field_is_on(layer, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+            scene_field_selects_mesh(layer, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
         is_there = is_there || session_catalogue_find_field(mesh, field->name);
         if (shown) status = check_field_on_mesh(basis, field, mesh, shown, error);
     }
@@ -352,7 +352,7 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const bool is_grey = mesh->first_rank >= 0 && scene_field_is_on(&layer->meshes_field, mesh->name) &&
+        const bool is_grey = mesh->first_rank >= 0 && scene_field_selects_mesh(&layer->meshes_field, mesh->name) &&
                              !session_catalogue_find_field(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
@@ -369,7 +369,7 @@ static void warn_of_no_lines(const session_catalogue *catalogue, const scene_ima
 {
     for (int m = 0; m < catalogue->mesh_count && lines->is_given && !lines->is_of_colours; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const bool is_on = on->name ? find_drawn_field(mesh, on) != NULL : scene_field_is_on(on, mesh->name);
+        const bool is_on = on->name ? find_drawn_field(mesh, on) != NULL : scene_field_selects_mesh(on, mesh->name);
         const session_warning warning = {WARNING_NO_LINES, image->name, mesh->name, lines->field.line};
         session_warn(report, &warning,
                      mesh->first_rank >= 0 && is_on && !session_catalogue_find_field(mesh, lines->field.name),

@@ -174,7 +174,7 @@ static bool find_mean_of_extremes(const digit_count *of, const counted_cells *ce
         *middle = 0.5 * value->minimum + 0.5 * value->maximum;
         return value->is_counted && (!of->is_positive || *middle > 0);
     }
-    if (!grid_is_seen(cells->g, cell)) return false;
+    if (!grid_can_be_shown(cells->g, cell)) return false;
     const fetch_range range = fetch_any_cell_range(cells->g, &cells->field, cell);
     *middle = 0.5 * range.low + 0.5 * range.high;
     return range.is_finite && (!of->is_positive || *middle > 0);

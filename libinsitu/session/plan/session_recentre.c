@@ -67,7 +67,7 @@ typedef struct recentring {
 /* ---- values by group ----------------------------------------------------------------------------------------- */
 
 /* Initializes groups that have no values yet. The caller keeps ownership of the array `starts`. */
-static bool groups_create(value_groups *groups, int64_t count, const int64_t *starts)
+static bool create_value_groups(value_groups *groups, int64_t count, const int64_t *starts)
 {
     *groups = (value_groups){.count = count, .starts = starts};
     groups->ends = base_alloc((size_t)count * sizeof *groups->ends);
@@ -283,7 +283,7 @@ static bool add_part_values(recentring *r, int part, int threads)
 }
 
 /* Adds the values of boundary faces to their groups. These groups are marked, so that they get no values of cells. */
-static void set_face_values(const session_patch_values *faces, value_groups *values)
+static void add_boundary_face_values(const session_patch_values *faces, value_groups *values)
 {
     for (int64_t i = 0; i < faces->count; i++) {
         const int64_t group = faces->groups[i];
@@ -339,7 +339,7 @@ static bool allocate_values(recentring *r, const session_patch_values *faces)
     const session_vertex_groups *groups = &r->mesh_group->groups;
     int64_t count = 0, added = 0;
     for (int i = 0; i < r->list.count; i++) count += faces[i].count;
-    if (count == 0) return groups_create(&r->values, groups->count, groups->corner_starts);
+    if (count == 0) return create_value_groups(&r->values, groups->count, groups->corner_starts);
     r->starts = base_calloc((size_t)groups->count + 1, sizeof *r->starts);
     if (!r->starts) return false;
     for (int i = 0; i < r->list.count; i++)
@@ -348,8 +348,8 @@ static bool allocate_values(recentring *r, const session_patch_values *faces)
         added += r->starts[g];
         r->starts[g] = groups->corner_starts[g] + added;
     }
-    if (!groups_create(&r->values, groups->count, r->starts)) return false;
-    for (int i = 0; i < r->list.count; i++) set_face_values(&faces[i], &r->values);
+    if (!create_value_groups(&r->values, groups->count, r->starts)) return false;
+    for (int i = 0; i < r->list.count; i++) add_boundary_face_values(&faces[i], &r->values);
     return true;
 }
 
@@ -447,7 +447,7 @@ static bool gather_values_by_group(const session_mail *in, const int64_t *groups
     int64_t i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r)) starts[groups[i++] + 1] += count_record_values(r);
     for (int64_t g = 0; g < count; g++) starts[g + 1] += starts[g];
-    if (!groups_create(values, count, starts)) return false;
+    if (!create_value_groups(values, count, starts)) return false;
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++)
         if (r[RECORD_HEAD - 1] & FACE_VALUES) values->has_face_values[groups[i]] = 1;
@@ -549,7 +549,8 @@ static insitu_status constrain_hanging(const recentring *r, const session_team *
     const session_hanging_basis basis = {r->mesh_group,          r->list.count,           r->list.items,
                                          groups->first_vertices, groups->group_of_vertex, groups->count};
     const insitu_status status = session_update_hanging_vertices(&basis, team, error);
-    return status ? status : session_constrain_hanging_vertices(&r->mesh_group->hanging, team, r->values.means, error);
+    return status ? status
+                  : session_interpolate_hanging_vertices(&r->mesh_group->hanging, team, r->values.means, error);
 }
 
 /* Allocates memory for the recentred values of each part. */

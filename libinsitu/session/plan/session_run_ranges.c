@@ -179,7 +179,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
 
 /* Initializes all->items[all->count] for the image, without ranges. The caller increments all->count when the ranges
  * have been read. */
-static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
+static bool append_empty_image_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);
     session_image_ranges *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
@@ -225,7 +225,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
 {
     *out = find_ranges(all, image);
     if (*out || count_layers(image) == 0) return INSITU_OK;
-    const bool is_prepared = prepare_ranges(all, image, error);
+    const bool is_prepared = append_empty_image_ranges(all, image, error);
     session_image_ranges *ranges = is_prepared ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
     if (!status && ranges) status = load_ranges_on_all_ranks(ranges, team, error);

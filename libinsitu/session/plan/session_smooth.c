@@ -59,7 +59,7 @@ bool session_has_smooth_normals(const scene_isosurface *layer, const session_cat
     bool has_polynomials = false;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        if (!mesh->has_higher_order || !scene_field_is_on(&layer->field, mesh->name)) continue;
+        if (!mesh->has_higher_order || !scene_field_selects_mesh(&layer->field, mesh->name)) continue;
         const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
         has_polynomials = has_polynomials || (field && field->centring != INSITU_CELL);
     }
@@ -77,7 +77,7 @@ bool session_has_curved_faces(const session_catalogue *catalogue)
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
     const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
-    if (!field || !scene_field_is_on(&layer->field, mesh->name)) return true;
+    if (!field || !scene_field_selects_mesh(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
     const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
     const uint64_t mesh_group_name =
@@ -95,7 +95,8 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
 }
 
 /* Lists the fields that need gradients, in the same order on all ranks. */
-static bool list_items(const session_plan *plan, const session_catalogue *catalogue, smooth_items *out)
+static bool list_fields_with_smooth_normals(const session_plan *plan, const session_catalogue *catalogue,
+                                            smooth_items *out)
 {
     bool is_listed = true;
     for (int m = 0; m < catalogue->mesh_count; m++)
@@ -274,7 +275,8 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
 {
     smooth_items items = {0};
     if (!session_plan_has_smooth_normals(plan, catalogue)) return INSITU_OK;
-    if (!list_items(plan, catalogue, &items)) session_fail_for_memory(error, 64, "the plan of gradients at vertices");
+    if (!list_fields_with_smooth_normals(plan, catalogue, &items))
+        session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)
         status = find_item_gradients(&items.items[i], meshes, team, extent, error);

@@ -58,12 +58,13 @@ static int list_image_requests(const scene_image *image, const session_catalogue
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         for (int n = 0; n < image->surface_count; n++) {
             const surface_request request = {mesh, &image->surfaces[n].threshold};
-            if (scene_field_is_on(&image->surfaces[n].meshes_field, mesh->name))
+            if (scene_field_selects_mesh(&image->surfaces[n].meshes_field, mesh->name))
                 count = add_surface_request(requests, count, &request);
         }
         for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
             const scene_field *field = &image->isosurfaces[n].field;
-            const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find_field(mesh, field->name);
+            const bool is_on =
+                scene_field_selects_mesh(field, mesh->name) && session_catalogue_find_field(mesh, field->name);
             if (is_on) count = add_surface_request(requests, count, &(surface_request){mesh, &none});
         }
     }

@@ -31,7 +31,7 @@ static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit 
 /* Minimum number of cells of a measurement from which costs are extrapolated. */
 enum { MEASURED_CELLS = 10000 };
 
-static double estimate_rate(double measured, double first, int threads)
+static double choose_measured_or_default_rate(double measured, double first, int threads)
 {
     return measured > 0 ? measured : first / threads;
 }
@@ -57,7 +57,7 @@ static mmbvh_options make_tree_options(const tree_update *u)
     return (mmbvh_options){.threads = u->threads};
 }
 
-static session_scalar *find_own_scalar(const session_mesh *mesh)
+static session_scalar *find_scalar_with_ranges_in_nodes(const session_mesh *mesh)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
         if (mesh->scalars[i].has_own_ranges) return &mesh->scalars[i];
@@ -66,9 +66,9 @@ static session_scalar *find_own_scalar(const session_mesh *mesh)
 
 /* Returns the scalar whose ranges are stored in the tree's nodes. If there is none yet, chooses the first scalar whose
  * ranges an image needs, and marks it as this scalar. */
-static session_scalar *choose_own_scalar(session_mesh *mesh)
+static session_scalar *choose_scalar_with_ranges_in_nodes(session_mesh *mesh)
 {
-    session_scalar *own = find_own_scalar(mesh);
+    session_scalar *own = find_scalar_with_ranges_in_nodes(mesh);
     for (int i = 0; i < mesh->scalar_count && !own; i++)
         if (mesh->scalars[i].needs_ranges) own = &mesh->scalars[i];
     if (!own->has_own_ranges) {
@@ -104,7 +104,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     options.builder = choose_builder(mesh, selection);
     session_drop_tree(mesh);
     u->trees->is_parent_stale = true;
-    session_scalar *own = choose_own_scalar(mesh);
+    session_scalar *own = choose_scalar_with_ranges_in_nodes(mesh);
     const grid_field field = session_get_scalar_values(mesh, own);
     const insitu_status status =
         mmbvh_build(&mesh->cells, &field, u->space->origin, u->space->scale, &options, &mesh->tree, error);
@@ -124,7 +124,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     return INSITU_OK;
 }
 
-static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, const mmbvh_options *options)
+static insitu_status refit_ranges_of_scalar(session_mesh *mesh, session_scalar *scalar, const mmbvh_options *options)
 {
     const grid_field field = session_get_scalar_values(mesh, scalar);
     if (scalar->has_own_ranges) {
@@ -145,12 +145,12 @@ static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, co
 static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base_error *error)
 {
     const mmbvh_options options = make_tree_options(u);
-    choose_own_scalar(mesh);
+    choose_scalar_with_ranges_in_nodes(mesh);
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (!scalar->needs_ranges || !scalar->are_ranges_stale) continue;
         const double start = omp_get_wtime();
-        const insitu_status status = refit_scalar(mesh, scalar, &options);
+        const insitu_status status = refit_ranges_of_scalar(mesh, scalar, &options);
         if (status)
             return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->label,
                              session_get_scalar_name(mesh, scalar));
@@ -289,7 +289,8 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
 
 static double estimate_full_tree_cost(const tree_update *u, const session_mesh *mesh)
 {
-    return estimate_rate(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
+    return choose_measured_or_default_rate(u->trees->rates.build, first_rates.build, u->threads) *
+           (double)mesh->drawn_count;
 }
 
 /* Returns whether there is a full tree built over the current cells. */
@@ -339,7 +340,8 @@ static insitu_status update_partial_tree(const tree_update *u, session_mesh *mes
     mesh->candidates_key = key;
     mesh->partial_tree_seconds += omp_get_wtime() - start;
     mesh->partial_tree_seconds -=
-        estimate_rate(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
+        choose_measured_or_default_rate(u->trees->rates.refit, first_rates.refit, u->threads) *
+        (double)mesh->drawn_count;
     return status;
 }
 

@@ -34,7 +34,7 @@ static void mark_vertices(session_sum_part *part)
     }
 }
 
-static bool key_all_vertices(session_vertex_sums *sums)
+static bool assign_keys_to_all_vertices(session_vertex_sums *sums)
 {
     int64_t most = 0;
     for (int i = 0; i < sums->part_count; i++) {
@@ -65,10 +65,10 @@ static int64_t count_vertices(const session_vertex_sums *sums)
     return count;
 }
 
-insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error)
+insitu_status session_assign_keys_to_vertices(session_vertex_sums *sums, base_error *error)
 {
     sums->has_all_vertices = true;
-    if (key_all_vertices(sums)) return INSITU_OK;
+    if (assign_keys_to_all_vertices(sums)) return INSITU_OK;
     return session_fail_for_memory(error, count_vertices(sums) * 60, "gradients at vertices");
 }
 
@@ -84,7 +84,7 @@ typedef struct sums_messages {
     int64_t *own_numbers, *requested_numbers;
 } sums_messages;
 
-static void mail_free(sums_messages *mail)
+static void free_sum_messages(sums_messages *mail)
 {
     base_free(mail->positions);
     session_mail_free(&mail->requests);
@@ -370,7 +370,7 @@ insitu_status session_compute_vertex_sums(const session_homes *homes, const sess
     if (!status && team->ranks > 1) status = send_answers(team, sums, &mail, error);
     for (int i = 0; i < sums->part_count && lists; i++) base_free(lists[i].cells);
     base_free(lists);
-    mail_free(&mail);
+    free_sum_messages(&mail);
     return status;
 }
 

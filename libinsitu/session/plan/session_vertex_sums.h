@@ -41,7 +41,7 @@ typedef struct session_vertex_sums {
 } session_vertex_sums;
 
 /* Makes the keys of all vertices of drawn cells, and stores their indices in key_indices. Local. */
-insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
+insitu_status session_assign_keys_to_vertices(session_vertex_sums *sums, base_error *error);
 
 /* Computes the sums for this rank's keys over all ranks. The keys, and key_indices of each part, must be set. A rank
  * that has failed before calls this function with its error in *error. Collective. All ranks return the same status. An

@@ -14,7 +14,7 @@
 
 static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
 {
-    if (!scene_field_is_on(field, mesh->name)) return false;
+    if (!scene_field_selects_mesh(field, mesh->name)) return false;
     const int index = session_find_field(mesh, field->name);
     return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
 }
@@ -109,7 +109,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
                                   &vertices->corners, error))
         return error->status;
     for (int64_t i = 0; i < vertices->corner_count; i++) session_store_index(&vertices->corners, i, i);
-    session_permute_cells(mesh, vertices->corner_count, threads, &vertices->corners);
+    session_permute_corners_of_cells(mesh, vertices->corner_count, threads, &vertices->corners);
     vertices->bytes = vertices->corner_count * vertices->corners.stride;
     return INSITU_OK;
 }

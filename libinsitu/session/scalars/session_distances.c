@@ -137,7 +137,7 @@ void session_update_distances(const session_meshes *meshes, const session_team *
 /* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so that no cell
  * crosses an isovalue that equals the minimum of all distances. If the minimum is 0 up to the tolerance, the isovalue
  * is therefore the minimum plus a tenth of the tolerance. This shift is large enough for float32, but not visible. */
-double session_slice_distance(double low, double high, double half_diagonal)
+double session_choose_slice_isovalue(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;
     if (!(low < high)) return 0;

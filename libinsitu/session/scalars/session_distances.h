@@ -31,6 +31,6 @@ void session_update_distances(const session_meshes *meshes, const session_team *
 /* Returns the distance at which the plane is drawn. low, high: minimum and maximum, over all ranks, of the signed
  * distances of the data's vertices from the plane. The result is 0 or, if the plane lies on the border of the data, a
  * distance just far enough inside for the slice to be visible. */
-double session_slice_distance(double low, double high, double half_diagonal);
+double session_choose_slice_isovalue(double low, double high, double half_diagonal);
 
 #endif

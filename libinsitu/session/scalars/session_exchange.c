@@ -184,7 +184,7 @@ insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, sess
     return status;
 }
 
-int64_t session_mail_round_size(int ranks, int64_t most)
+int64_t session_count_items_per_round(int ranks, int64_t most)
 {
     enum { LEAST = 1 << 10, QUESTIONS = 1 << 22 };
     const int64_t count = QUESTIONS / ranks;

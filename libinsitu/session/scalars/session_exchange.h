@@ -37,6 +37,6 @@ insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, sess
 /* Returns the number of items, such as patch faces or vertices, that a rank processes in one round of messages, if each
  * item may cause a message to every rank. It is at most `most`, and smaller for more ranks, so that the memory for a
  * round's messages is bounded. The result is the same on all ranks. */
-int64_t session_mail_round_size(int ranks, int64_t most);
+int64_t session_count_items_per_round(int ranks, int64_t most);
 
 #endif

@@ -388,7 +388,7 @@ static void add_shell(target *to, int64_t cell, node_list *list)
 static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
 {
     for (int f = 0; f < basis->field_count; f++)
-        if (!grid_has_own_value(&basis->fields[f], cell)) return false;
+        if (!grid_has_finite_cell_value(&basis->fields[f], cell)) return false;
     return true;
 }
 

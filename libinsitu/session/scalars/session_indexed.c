@@ -14,11 +14,11 @@
 #include "session_scalars.h"
 #include "session_discontinuous.h"
 
-void session_request_field(const session_meshes *meshes, const scene_field *field)
+void session_mark_field_for_statistics(const session_meshes *meshes, const scene_field *field)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
-        const int index = scene_field_is_on(field, mesh->label) ? session_find_field(mesh, field->name) : -1;
+        const int index = scene_field_selects_mesh(field, mesh->label) ? session_find_field(mesh, field->name) : -1;
         if (index >= 0 && !mesh->source) mesh->fields[index].is_in_statistics = true;
     }
 }

@@ -8,8 +8,8 @@
 #include "session_mesh.h"
 
 /* Marks the field as needed by statistics of this step, on all meshes that have it. Local. */
-void session_request_field(const session_meshes *meshes, const scene_field *field);
-/* Removes all marks that session_request_field() has set. Local. */
+void session_mark_field_for_statistics(const session_meshes *meshes, const scene_field *field);
+/* Removes all marks that session_mark_field_for_statistics() has set. Local. */
 void session_clear_requested_fields(const session_meshes *meshes);
 
 /* Both functions copy values into the order of the mesh by their index, unless the copy is up to date.

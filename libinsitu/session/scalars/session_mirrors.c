@@ -56,8 +56,8 @@ static insitu_field describe_field(session_mesh *image, const session_field *fro
 }
 
 /* Sets a field of the source mesh on its mirror image, unless the image already has the field's current values. */
-static insitu_status share_field(session_meshes *meshes, session_mesh *image, const session_field *from,
-                                 base_error *error)
+static insitu_status set_field_on_mirror_image(session_meshes *meshes, session_mesh *image, const session_field *from,
+                                               base_error *error)
 {
     const int at = session_find_field(image, from->given.name);
     const bool is_new = at < 0;
@@ -81,7 +81,7 @@ static insitu_status share_field(session_meshes *meshes, session_mesh *image, co
 static void share_fields(session_meshes *meshes, session_mesh *image, base_error *error)
 {
     for (int f = 0; f < image->source->field_count && !error->status; f++)
-        share_field(meshes, image, &image->source->fields[f], error);
+        set_field_on_mirror_image(meshes, image, &image->source->fields[f], error);
 }
 
 static void share_derived_field(session_mesh *image, const char *name)

@@ -52,7 +52,7 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
 /* Returns the field's index on the mesh; -1 if the layer is not drawn on the mesh or the mesh lacks the field. */
 static int find_field(const session_mesh *mesh, const scene_field *field)
 {
-    return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
+    return scene_field_selects_mesh(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
 }
 
 bool session_is_recentred(const scene_field *field, insitu_centring centring, bool is_refined)
@@ -213,7 +213,7 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
         region_enter();
 #pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++) {
-            if (of_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
+            if (of_shells ? !grid_can_be_shown(g, cell) : !grid_is_drawn(g, cell)) continue;
             const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
             if (!of_cell.is_finite) continue;
             if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);

@@ -131,7 +131,7 @@ void session_warn_of_absent_mesh(const char *name, int line, session_transform t
 {
     bool is_any = false;
     for (int m = 0; m < catalogue->mesh_count; m++)
-        is_any = is_any || scene_name_stands_for(name, catalogue->meshes[m].name);
+        is_any = is_any || scene_name_selects_mesh(name, catalogue->meshes[m].name);
     session_warn(report, &(session_warning){WARNING_MESH, NULL, name, (int)transform}, !is_any,
                  "meshes.%s (line %d of the scene): no mesh has this name: nothing is %s", name, line,
                  transform == SESSION_WARP ? "warped" : "mirrored");

@@ -201,16 +201,16 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
 
 /* ---- meshes ---- */
 
-bool scene_name_stands_for(const char *name, const char *mesh)
+bool scene_name_selects_mesh(const char *name, const char *mesh)
 {
     const size_t length = strlen(name);
     return strncmp(name, mesh, length) == 0 && (mesh[length] == '\0' || mesh[length] == '/');
 }
 
-bool scene_field_is_on(const scene_field *field, const char *mesh)
+bool scene_field_selects_mesh(const scene_field *field, const char *mesh)
 {
     for (int i = 0; i < field->mesh_count; i++)
-        if (scene_name_stands_for(field->meshes[i], mesh)) return true;
+        if (scene_name_selects_mesh(field->meshes[i], mesh)) return true;
     return field->mesh_count == 0;
 }
 
@@ -218,7 +218,7 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
  * `found`. This is the case if `name` selects the mesh and is longer than `found`, or if found is NULL. */
 static bool is_better_match(const char *name, const char *found, const char *mesh)
 {
-    return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));
+    return scene_name_selects_mesh(name, mesh) && (!found || strlen(name) > strlen(found));
 }
 
 const scene_warp *scene_find_warp(const scene *s, const char *mesh)

@@ -42,10 +42,10 @@ typedef struct scene_field {
 
 /* Returns whether the field's list of meshes (scene_field.meshes) selects the mesh of this name. The mesh may
  * nevertheless lack the field. */
-bool scene_field_is_on(const scene_field *field, const char *mesh);
+bool scene_field_selects_mesh(const scene_field *field, const char *mesh);
 /* Returns whether a name in a scene selects the mesh. It does so if it is the mesh's whole name, or the part of the
  * mesh's name before a slash. */
-bool scene_name_stands_for(const char *name, const char *mesh);
+bool scene_name_selects_mesh(const char *name, const char *mesh);
 
 /* The kind of a derived field. All kinds except SCENE_EXPRESSION are computed from gradients at vertices. */
 typedef enum scene_derivation {
@@ -617,7 +617,7 @@ typedef struct scene_parameter {
 /* Draws the vertices of meshes at x + scale * u, where u is the value of a field at the vertex. */
 typedef struct scene_warp {
     /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes
-     * (scene_name_stands_for()) */
+     * (scene_name_selects_mesh()) */
     char *mesh;
     char *field;          /* name of the field of displacements */
     double scale;         /* factor by which displacements are multiplied */

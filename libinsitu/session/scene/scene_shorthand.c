@@ -380,7 +380,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 
 enum { LONGEST_WORD = 63 };
 
-static int find_smallest_value_of_code(int a, int b)
+static int find_smaller_integer(int a, int b)
 {
     return a < b ? a : b;
 }
@@ -396,10 +396,10 @@ static int count_edits(const char *a, const char *b)
         const int *above = rows[(i + 2) % 3], *second = rows[(i + 1) % 3];
         row[0] = i;
         for (int j = 1; j <= n; j++) {
-            row[j] = find_smallest_value_of_code(find_smallest_value_of_code(above[j], row[j - 1]) + 1,
-                                                 above[j - 1] + (a[i - 1] != b[j - 1]));
+            row[j] = find_smaller_integer(find_smaller_integer(above[j], row[j - 1]) + 1,
+                                          above[j - 1] + (a[i - 1] != b[j - 1]));
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-                row[j] = find_smallest_value_of_code(row[j], second[j - 2] + 1);
+                row[j] = find_smaller_integer(row[j], second[j - 2] + 1);
         }
     }
     return rows[m % 3][n];

@@ -171,10 +171,10 @@ static bool make_rule(const session_nodes *of, int line_count, bool is_lobatto, 
 
 /* Computes corner_weights: the values, at all nodes, of the linear functions that are 1 at one corner and 0 at all
  * other corners. */
-static bool weigh_corners(bool is_lobatto, session_cell_rules *out)
+static bool compute_corner_function_values(bool is_lobatto, session_cell_rules *out)
 {
     const session_nodes *of = &out->nodes.complete;
-    const session_shape *shape = session_shape_of(of->type);
+    const session_shape *shape = session_get_cell_shape(of->type);
     const int p = of->order, simplex = (grid_is_shell_type(of->type) ? 2 : AXES) - out->line_count;
     double line[NODES_MOST_ORDER + 1];
     session_compute_node_positions(p, is_lobatto, line);
@@ -210,8 +210,8 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                                               : type == GRID_QUAD || type == GRID_WEDGE ? 1
                                                                                         : 0};
     if (is_pyramid) out->collapse = session_compute_collapse_matrix(of->order);
-    return session_make_node_positions(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
-           (!has_straight || weigh_corners(has_spacing, out)) &&
+    return session_map_nodes_to_connectivity(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
+           (!has_straight || compute_corner_function_values(has_spacing, out)) &&
            make_rule(&nodes, out->line_count, has_spacing, true, &out->bent) &&
            (!has_straight || make_rule(&nodes, out->line_count, has_spacing, false, &out->straight));
 }
@@ -326,7 +326,7 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
     v->visit(v->of, count, measures, values[0]);
 }
 
-static void visit_first(const cell_visit *v, double weight)
+static void visit_points_of_first_factor(const cell_visit *v, double weight)
 {
     const session_rule_factor *factor = &v->rule->first;
     const double *functions = factor->functions ? factor->functions : v->functions;
@@ -340,8 +340,8 @@ static void visit_first(const cell_visit *v, double weight)
 /* Interpolates one component at a point of a line. The component is given at the line's nodes, as an array of `size`
  * numbers for each node; `out` receives `size` numbers. functions: the values of the line's nodal functions at the
  * point, line->width doubles apart. */
-static void sum_line(const session_rule_factor *line, const double *functions, size_t size, const double *restrict in,
-                     double *restrict out)
+static void interpolate_along_line(const session_rule_factor *line, const double *functions, size_t size,
+                                   const double *restrict in, double *restrict out)
 {
     memset(out, 0, size * sizeof *out);
     for (int n = 0; n < line->node_count; n++)
@@ -359,11 +359,11 @@ static void evaluate_lattice_on_line(const cell_visit *v, int lines, int point)
     const size_t size = count_lattice_nodes(v->rules, lines - 1), stride = size * (size_t)line->node_count;
     const int components = SIZE + 3 * (v->rules->line_count - lines);
     for (int c = 0; c < components; c++)
-        sum_line(line, values, size, v->lattices[lines] + (size_t)c * stride,
-                 v->lattices[lines - 1] + (size_t)c * size);
+        interpolate_along_line(line, values, size, v->lattices[lines] + (size_t)c * stride,
+                               v->lattices[lines - 1] + (size_t)c * size);
     for (int c = 0; c < 3; c++)
-        sum_line(line, slopes, size, v->lattices[lines] + (size_t)c * stride,
-                 v->lattices[lines - 1] + (size_t)(components + c) * size);
+        interpolate_along_line(line, slopes, size, v->lattices[lines] + (size_t)c * stride,
+                               v->lattices[lines - 1] + (size_t)(components + c) * size);
 }
 
 static void visit_points(const cell_visit *v)
@@ -374,7 +374,7 @@ static void visit_points(const cell_visit *v)
         if (lines > 1) evaluate_lattice_on_line(v, 2, k);
         for (int j = 0; j < along; j++) {
             if (lines > 0) evaluate_lattice_on_line(v, 1, j);
-            visit_first(v, (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
+            visit_points_of_first_factor(v, (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
         }
     }
 }

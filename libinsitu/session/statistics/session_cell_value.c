@@ -4,7 +4,7 @@
 
 session_cell_value session_read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *buffer)
 {
-    session_cell_value out = {.is_counted = grid_is_seen(g, cell),
+    session_cell_value out = {.is_counted = grid_can_be_shown(g, cell),
                               .is_shell = grid_is_shell(g, cell),
                               .minimum = INFINITY,
                               .maximum = -INFINITY};

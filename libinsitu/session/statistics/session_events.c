@@ -97,7 +97,7 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
 {
     event_work work;
     if (!work_create(scene, now->cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
-    for (int i = 0; i < work.count; i++) session_request_field(meshes, work.requests[i].field);
+    for (int i = 0; i < work.count; i++) session_mark_field_for_statistics(meshes, work.requests[i].field);
     /* ranks agree on errors before fill functions are called, because fill functions may be collective */
     insitu_status status = session_agree(team->comm, error);
     if (!status) session_fill_fields(meshes, catalogue, false, error);

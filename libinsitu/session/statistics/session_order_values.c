@@ -250,7 +250,7 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
     const int kind = session_find_kind_of_cell(&p->rows, cell);
     const session_nodes *nodes = &p->rows.kinds[kind].nodes;
     if (grid_is_ghost(&p->rows.cells, cell) ||
-        !grid_has_own_value(&p->of->values, session_first_piece(p->of->mesh, cell)))
+        !grid_has_finite_cell_value(&p->of->values, session_first_piece(p->of->mesh, cell)))
         return (session_cell_value){.is_counted = false};
     if (is_summed(nodes)) return sum_pieces(p, cell, buffer);
     if (nodes->order == 1) return find_linear_value(p, &p->rules[kind].nodes, cell, buffer);
@@ -323,7 +323,7 @@ static bool begin_pass(order_pass *p)
         const session_nodes *nodes = &p->rows.kinds[i].nodes;
         const insitu_vertex_order order = session_nodal_mesh(mesh)->vertex_order;
         if (is_summed(nodes)) continue;
-        is_made = nodes->order == 1 ? session_make_node_positions(nodes, order, &p->rules[i].nodes)
+        is_made = nodes->order == 1 ? session_map_nodes_to_connectivity(nodes, order, &p->rules[i].nodes)
                                     : session_make_cell_rules(nodes, order, p->of->is_lobatto, &p->rules[i]);
     }
     return is_made;

@@ -159,7 +159,7 @@ static session_cell_value **find_order_values(const statistics_work *w, int requ
 
 /* Fills *pass with the input for a pass over the request's field on one of this rank's meshes. Returns false if the
  * mesh does not have the field. */
-static bool set_up_pass(const statistics_work *w, int request, int mesh, statistics_pass *pass)
+static bool fill_statistics_pass(const statistics_work *w, int request, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
     *pass = (statistics_pass){.mesh = of,
@@ -234,7 +234,7 @@ static insitu_status reduce_extremes(const statistics_work *w, base_error *error
         for (int k = 0; k < KINDS * ENDS; k++) ends[k] = k % ENDS == 2 ? 0 : INFINITY;
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (!set_up_pass(w, i, m, &pass)) continue;
+            if (!fill_statistics_pass(w, i, m, &pass)) continue;
             make_order_values(w, i, m, &pass, error);
             if (!error->status) find_extremes(&pass, ends);
         }
@@ -259,7 +259,7 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
         const sum_basis basis = {&known[i], -find_request_extremes(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (!set_up_pass(w, i, m, &pass)) continue;
+            if (!fill_statistics_pass(w, i, m, &pass)) continue;
             add_cells(&pass, &basis, w->sums + size * i, size);
             if (!is_second) add_order_bins(w, i, m, &basis, error);
         }

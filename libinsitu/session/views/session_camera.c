@@ -71,7 +71,7 @@ typedef struct camera_fit {
 static const double bar_space = 6.5, title_space = 2.4, line_space = 1.5, ruler_space = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
-static double reduce_fraction(double most, double words, double pixels)
+static double subtract_decoration_space(double most, double words, double pixels)
 {
     return fmax(most - 2 * words / pixels, 0.5);
 }
@@ -143,10 +143,10 @@ static camera_frame find_free_frame(const scene_image *image, double most)
     const double foot = find_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
     const double right = rulers + (d->bar_anchor == SCENE_RIGHT ? bars : 0);
     const double left = rulers + (d->bar_anchor == SCENE_LEFT ? bars : 0);
-    return (camera_frame){.right = reduce_fraction(most, right * size, image->width),
-                          .left = reduce_fraction(most, left * size, image->width),
-                          .up = reduce_fraction(most, top * size, image->height),
-                          .down = reduce_fraction(most, (rulers + foot) * size, image->height)};
+    return (camera_frame){.right = subtract_decoration_space(most, right * size, image->width),
+                          .left = subtract_decoration_space(most, left * size, image->width),
+                          .up = subtract_decoration_space(most, top * size, image->height),
+                          .down = subtract_decoration_space(most, (rulers + foot) * size, image->height)};
 }
 
 static corner_reach find_reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)

@@ -124,8 +124,8 @@ static bool is_same_request(const session_error_request *a, const session_error_
 
 /* Returns the request in the list that equals `like`, and adds it if the list does not contain it. If the list is full,
  * returns the first request, which is that for positions, and sets needs_all, so that all cells are refined. */
-static session_error_request *find_request(session_error_requests *requests, const session_due_views *views,
-                                           const session_error_request *like)
+static session_error_request *find_or_add_request(session_error_requests *requests, const session_due_views *views,
+                                                  const session_error_request *like)
 {
     for (int i = 0; i < requests->count; i++)
         if (is_same_request(&requests->items[i], like)) return &requests->items[i];
@@ -139,10 +139,10 @@ static session_error_request *find_request(session_error_requests *requests, con
     return request;
 }
 
-static session_error_request *show_request(session_error_requests *requests, const session_due_views *views,
-                                           const session_error_request *like, int image)
+static session_error_request *mark_request_as_shown(session_error_requests *requests, const session_due_views *views,
+                                                    const session_error_request *like, int image)
 {
-    session_error_request *request = find_request(requests, views, like);
+    session_error_request *request = find_or_add_request(requests, views, like);
     request->is_shown = requests->is_shown = true;
     if (requests->is_complete) request->images[image] = true;
     return request;
@@ -161,7 +161,7 @@ static void add_value(session_error_requests *requests, session_error_request *r
 
 static const session_catalogue_field *find_shown_field(const session_catalogue_mesh *mesh, const scene_field *field)
 {
-    return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+    return scene_field_selects_mesh(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
 /* Returns whether the layer shows the values that the caller gave, unchanged. These values do not depend on other
@@ -192,7 +192,7 @@ static void add_isosurface(session_error_requests *requests, const session_due_v
     const bool is_bounded = is_polynomial(mesh, field, &shown->field);
     if (is_bounded) like.field = field->name;
     if (is_bounded) like.component = session_resolve_component(&shown->field, field->component_count);
-    session_error_request *request = show_request(requests, views, &like, index);
+    session_error_request *request = mark_request_as_shown(requests, views, &like, index);
     for (int i = 0; i < shown->value_count && request->field && image->variant.view == 0; i++)
         add_value(requests, request, shown->values[i]);
     /* central differences sample the field also in neighbours of the cells that the isosurface crosses */
@@ -214,7 +214,7 @@ static void add_slice(session_error_requests *requests, const session_due_views 
         session_error_request like = {.has_plane = true};
         memcpy(like.plane.normal, shown->planes[i].normal, sizeof like.plane.normal);
         session_find_plane_point(&shown->planes[i], &views->extent, like.plane.point);
-        show_request(requests, views, &like, index);
+        mark_request_as_shown(requests, views, &like, index);
     }
 }
 
@@ -229,7 +229,7 @@ static void add_volume(session_error_requests *requests, const session_due_views
                                         .component = session_resolve_component(&shown->field, field->component_count),
                                         .volume = shown,
                                         .allowed = image->max_error > 0 ? image->max_error : usual_error};
-    show_request(requests, views, &like, index);
+    mark_request_as_shown(requests, views, &like, index);
 }
 
 /* Sets needs_all if the image shows a volume of the mesh, and needs_outer if it shows the mesh's outer surface. If the
@@ -243,13 +243,13 @@ static void add_whole_layers(session_error_requests *requests, const session_due
     for (int i = 0; i < image->volume_count; i++) {
         if (!find_shown_field(mesh, &image->volumes[i].field)) continue;
         requests->needs_all = true;
-        show_request(requests, views, &positions, index);
+        mark_request_as_shown(requests, views, &positions, index);
     }
     for (int i = 0; i < image->surface_count; i++) {
-        if (!scene_field_is_on(&image->surfaces[i].meshes_field, mesh->name)) continue;
+        if (!scene_field_selects_mesh(&image->surfaces[i].meshes_field, mesh->name)) continue;
         requests->needs_outer = true;
         requests->needs_all = requests->needs_all || image->surfaces[i].threshold.is_given;
-        show_request(requests, views, &positions, index);
+        mark_request_as_shown(requests, views, &positions, index);
     }
 }
 
@@ -269,7 +269,7 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
     const session_error_request positions = {.field = NULL};
     bool are_any_due = false;
     *out = (session_error_requests){.is_complete = true, .needs_all = has_shells};
-    find_request(out, views, &positions);
+    find_or_add_request(out, views, &positions);
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &scene->images[i];
         are_any_due = are_any_due || views->are_due[i];

@@ -378,7 +378,7 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
     insitu_status status = session_find_extremes(basis->meshes, basis->team, &distances, &low, &high, error);
     if (!status) status = make_transfer(basis, &layer->field, &layer->colour_map, NULL, transfer, error);
     if (status) return status;
-    layers->distances[surface] = session_slice_distance(low, high, basis->half_diagonal);
+    layers->distances[surface] = session_choose_slice_isovalue(low, high, basis->half_diagonal);
     warn_of_plane(basis, image, surface, low, high);
     layers->surfaces[surface] = (render_surface_layer){
         .field = set_layer_field(basis->meshes, layers, 2 * surface, &layer->field, plane, true),

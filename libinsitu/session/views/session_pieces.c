@@ -83,7 +83,7 @@ static insitu_status use_values(void *of, const session_node_values *values, bas
     return apply_request(work, error);
 }
 
-static void use_request_in_part(part_work *work, const session_error_request *request, base_error *error)
+static void apply_error_request_to_part(part_work *work, const session_error_request *request, base_error *error)
 {
     static const double zero = 0;
     const mesh_work *w = work->of;
@@ -94,8 +94,8 @@ static void use_request_in_part(part_work *work, const session_error_request *re
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    /* a slice at the border of the data may be moved by this distance (session_slice_distance()), so that its tolerance
-     * is positive */
+    /* a slice at the border of the data may be moved by this distance (session_choose_slice_isovalue()), so that its
+     * tolerance is positive */
     if (request->has_plane)
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
@@ -112,7 +112,7 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
     for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
         if (request->is_shown && !request->volume && (!w->marks_only || marks))
-            use_request_in_part(&work, request, error);
+            apply_error_request_to_part(&work, request, error);
     }
     for (int64_t cell = 0; work.request.measured && cell < session_nodal_mesh(mesh)->cell_count; cell++)
         if (work.request.measured[cell]) cells[cell] = 1;
@@ -127,7 +127,8 @@ static void choose_pieces_of_part(const mesh_work *w, const session_mesh *mesh, 
     session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
     for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
-        if (request->is_shown && (request->field || request->has_plane)) use_request_in_part(&work, request, error);
+        if (request->is_shown && (request->field || request->has_plane))
+            apply_error_request_to_part(&work, request, error);
     }
     if (w->requests.needs_outer && !error->status) session_add_outer_pieces(mesh, w->choice->parts, work.pieces, error);
 }
@@ -138,7 +139,7 @@ static void measure_or_choose_parts(const mesh_work *w, const char *name, base_e
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
     const bool is_chosen = w->choice->parts > 1;
-    if (!is_chosen && !w->requests.needs_all && !session_begin_marks(w->choice, &parts))
+    if (!is_chosen && !w->requests.needs_all && !session_allocate_cell_marks(w->choice, &parts))
         session_fail_for_memory(error, parts.count, "marks of cells of higher order");
     for (int i = 0; i < parts.count && !error->status; i++) {
         const session_mesh *mesh = parts.items[i];
@@ -180,9 +181,9 @@ static void fill_fields(const session_pieces_basis *basis, const session_due_vie
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &basis->scene->images[i];
         for (int layer = 0; views->are_due[i] && layer < image->isosurface_count; layer++)
-            session_request_field(basis->meshes, &image->isosurfaces[layer].field);
+            session_mark_field_for_statistics(basis->meshes, &image->isosurfaces[layer].field);
         for (int layer = 0; views->are_due[i] && layer < image->volume_count; layer++)
-            session_request_field(basis->meshes, &image->volumes[layer].field);
+            session_mark_field_for_statistics(basis->meshes, &image->volumes[layer].field);
     }
     session_fill_fields(basis->meshes, basis->catalogue, false, &unheard);
     session_clear_requested_fields(basis->meshes);
@@ -276,7 +277,7 @@ static bool is_outer_shown(const session_due_views *views, const char *mesh)
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &views->scene->images[i];
         for (int layer = 0; views->are_due[i] && layer < image->surface_count; layer++)
-            if (scene_field_is_on(&image->surfaces[layer].meshes_field, mesh)) return true;
+            if (scene_field_selects_mesh(&image->surfaces[layer].meshes_field, mesh)) return true;
     }
     return false;
 }
@@ -339,7 +340,7 @@ static double find_allowed_error(const scene *scene, const piece_error *of)
  * If all cells of a mesh are refined, memory and time grow with the cube of this number. In that case more than 2
  * pieces are chosen for the error of surfaces only if the scene gives surface_error, and at most 8 for the
  * error of volumes, which always need all cells. */
-static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
+static int choose_smallest_piece_count(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2, MOST_FOR_VOLUMES = 8 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
@@ -365,7 +366,7 @@ static void choose_fixed_piece_count(const char *mesh, const scene *scene, const
 static void choose_piece_count_by_error(const char *mesh, const scene *scene, const piece_error *of,
                                         session_finer_choice *choice, session_report *report)
 {
-    choice->parts = choice->excluded_count || choice->order < 2 ? 1 : find_pieces(scene, choice, of);
+    choice->parts = choice->excluded_count || choice->order < 2 ? 1 : choose_smallest_piece_count(scene, choice, of);
     const double met = of->all.error / (choice->parts * choice->parts);
     session_warn(
         report, &(session_warning){WARNING_FINER, NULL, mesh, 1},
@@ -397,7 +398,8 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
         for (int i = 0; i < scene->image_count && !is_shown; i++) {
             scene_field_walk walk = {.image = &scene->images[i]};
             for (const scene_field *field; !is_shown && (field = scene_next_field(&walk)) != NULL;)
-                is_shown = strcmp(field->name, mesh->fields[f].name) == 0 && scene_field_is_on(field, mesh->name);
+                is_shown =
+                    strcmp(field->name, mesh->fields[f].name) == 0 && scene_field_selects_mesh(field, mesh->name);
         }
         if (is_shown) count += mesh->fields[f].component_count;
     }
@@ -406,7 +408,7 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
 
 /* Returns the number of bytes that the finer lattices of a mesh and the values at their nodes take, if there are
  * `parts` pieces between two nodes. The result never decreases if `parts` increases. */
-static double find_bytes(const piece_error *of, int parts)
+static double compute_finer_lattice_bytes(const piece_error *of, int parts)
 {
     const session_finer_bytes *bytes = &of->bytes[parts];
     return (double)bytes->own + of->components * (double)bytes->per_component;
@@ -436,16 +438,16 @@ static double reduce_pieces(int mesh_count, double limit, const piece_error *err
     double all = 0;
     int count = 0;
     for (int m = 0; m < mesh_count; m++) {
-        all += find_bytes(&errors[m], choices[m].parts);
+        all += compute_finer_lattice_bytes(&errors[m], choices[m].parts);
         for (int parts = choices[m].parts; parts > 1; parts--)
-            steps[count++] = (piece_step){find_bytes(&errors[m], parts), m, parts};
+            steps[count++] = (piece_step){compute_finer_lattice_bytes(&errors[m], parts), m, parts};
     }
     if (!(all > limit)) return all;
     qsort(steps, (size_t)count, sizeof *steps, compare_steps);
     double sum = all;
     for (const piece_step *step = steps; step < steps + count && sum > limit; step++) {
         choices[step->mesh].parts = step->parts - 1;
-        sum += find_bytes(&errors[step->mesh], step->parts - 1) - step->bytes;
+        sum += compute_finer_lattice_bytes(&errors[step->mesh], step->parts - 1) - step->bytes;
     }
     return all;
 }

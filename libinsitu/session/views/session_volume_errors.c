@@ -137,7 +137,7 @@ static void find_own_range(const session_meshes *meshes, int threads, session_va
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         range_work work = {meshes->items[m], threads, range};
-        const bool is_shown = scene_field_is_on(range->field, work.mesh->label);
+        const bool is_shown = scene_field_selects_mesh(range->field, work.mesh->label);
         const int field = is_shown ? session_find_field(work.mesh, range->field->name) : -1;
         if (field >= 0 && !work.mesh->source) session_read_nodes(work.mesh, field, extend_range, &work, error);
     }
