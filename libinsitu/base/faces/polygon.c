@@ -14,6 +14,9 @@ static const double fan_slack = 0x1p-20;
  * few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
+/* NO_BLOCKER: there is an ear; NOT_CONVEX: there is none, because the corner is not convex. */
+enum { NO_BLOCKER = -1, NOT_CONVEX = -2 };
+
 /* The corners of a polygon, numbered in the order that polygon.h defines. */
 typedef struct polygon_work {
     int count;
@@ -25,13 +28,16 @@ typedef struct polygon_work {
     /* corners projected into a plane along the polygon's normal; the corners run counterclockwise in this plane */
     double (*projection)[2];
     int *next, *previous; /* doubly linked list of the corners that have not been cut off */
+    /* For each of these corners, the index of a corner that prevents an ear there, or one of the constants above. It is
+     * stored, because testing all corners again after every cut would take cubic time. */
+    int *blocker;
     int (*triangles)[3];
     int triangle_count;
 } polygon_work;
 
 size_t polygon_work_bytes(int count)
 {
-    return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int));
+    return (size_t)count * (5 * sizeof(double) + 4 * sizeof(int));
 }
 
 static polygon_work divide_work(int count, char *work, int (*triangles)[3])
@@ -43,6 +49,7 @@ static polygon_work divide_work(int count, char *work, int (*triangles)[3])
     w.order = (int *)(void *)(work + 5 * n * sizeof(double));
     w.next = w.order + n;
     w.previous = w.next + n;
+    w.blocker = w.previous + n;
     return w;
 }
 
@@ -194,13 +201,13 @@ static bool is_ear_blocked_by_corner(const polygon_work *w, int a, int tip, int 
            compute_triangle_area(w, c, a, by) >= -line_slack;
 }
 
-static bool is_ear(const polygon_work *w, int tip)
+static int find_blocker(const polygon_work *w, int tip)
 {
     const int a = w->previous[tip], c = w->next[tip];
-    if (!(compute_triangle_area(w, a, tip, c) > line_slack)) return false;
+    if (!(compute_triangle_area(w, a, tip, c) > line_slack)) return NOT_CONVEX;
     for (int by = w->next[c]; by != a; by = w->next[by])
-        if (is_ear_blocked_by_corner(w, a, tip, c, by)) return false;
-    return true;
+        if (is_ear_blocked_by_corner(w, a, tip, c, by)) return by;
+    return NO_BLOCKER;
 }
 
 /* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if there
@@ -210,7 +217,7 @@ static int find_ear(const polygon_work *w, int first)
     int i = first;
     do {
         i = w->next[i];
-        if (is_ear(w, i)) return i;
+        if (w->blocker[i] == NO_BLOCKER) return i;
     } while (i != first);
     return -1;
 }
@@ -226,9 +233,21 @@ static int find_collinear_corner(const polygon_work *w, int first)
     return -1;
 }
 
+/* Updates the blockers after the corner `cut` between the corners a and c has been cut off. They may change at a and c,
+ * where `cut` was the blocker, and at corners that coincide with a or c (does_edge_enter_corner()). */
+static void update_blockers(polygon_work *w, int a, int cut, int c)
+{
+    int i = a;
+    do {
+        if (w->blocker[i] == cut || are_coincident(w, i, a) || are_coincident(w, i, c))
+            w->blocker[i] = find_blocker(w, i);
+    } while ((i = w->next[i]) != a);
+}
+
 static void cut_ears(polygon_work *w)
 {
     int first = 0;
+    for (int i = 0; i < w->count; i++) w->blocker[i] = find_blocker(w, i);
     for (int left = w->count; left > 3; left--) {
         int ear = find_ear(w, first);
         if (ear < 0) ear = find_collinear_corner(w, first);
@@ -238,6 +257,7 @@ static void cut_ears(polygon_work *w)
         w->next[a] = c;
         w->previous[c] = a;
         if (ear == first) first = c;
+        update_blockers(w, a, ear, c);
     }
     add_fan(w, first);
 }
