@@ -217,7 +217,7 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
 /* Returns the light of one segment per ray, without what lies in front of it, within the allowed error. *begin: the
  * position in the table of the value at which the previous segments ended; it is replaced if this segment begins with
  * another value. *end becomes the position of this segment's end. The caller passes it as `begin` for the next segment:
- * two structs in turn, because a copy would take a tenth of the time. */
+ * two structs in turn, because copying one would take 4 % of a frame of tets (AVX2). */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                               kernel_preint_end *begin, kernel_preint_end *end)
 {
