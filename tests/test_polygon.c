@@ -262,6 +262,28 @@ static void triangulation_depends_on_positions_only(void **state)
         }
 }
 
+/* Checks closed random walks on a lattice, whose corners often coincide, so that edges of one corner may lead into
+ * another corner at the same position. */
+static void self_touching_polygons_match_the_reference(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 0; seed < 3000; seed++) {
+        static polygon p;
+        static cut c;
+        static double own[MOST][9], found[MOST][9];
+        p.count = 0;
+        for (uint64_t i = 0; i < 6 + seed % 9; i++)
+            add_vertex(&p, floor(test_uniform_between(2 * i, seed, 0, 4)),
+                       floor(test_uniform_between(2 * i + 1, seed, 0, 3)));
+        embed_in_space(0, 0, &p);
+        cut_polygon(&p, &c);
+        const int count = list_sorted_triangles(&p, &c, own);
+        c.count = reference_polygon_triangulate((const double(*)[3])p.corners, p.count, c.triangles);
+        assert_int_equal(list_sorted_triangles(&p, &c, found), count);
+        assert_memory_equal(own, found, (size_t)count * sizeof *own);
+    }
+}
+
 static void convex_polygons_are_fans(void **state)
 {
     (void)state;
@@ -282,8 +304,8 @@ static void convex_polygons_are_fans(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(polygons_are_covered_once),
-                                       cmocka_unit_test(triangulation_depends_on_positions_only),
-                                       cmocka_unit_test(convex_polygons_are_fans)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(polygons_are_covered_once), cmocka_unit_test(triangulation_depends_on_positions_only),
+        cmocka_unit_test(self_touching_polygons_match_the_reference), cmocka_unit_test(convex_polygons_are_fans)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
