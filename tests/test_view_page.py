@@ -74,7 +74,7 @@ def peaks():
 
 def a_run_that_begins_is_followed(page, run):
     wait("the page waits", lambda: "no pictures yet" in page.text("waiting"))
-    assert page.at("text").get_attribute("value") == SCENE
+    wait("the scene is read", lambda: page.at("text").get_attribute("value") == SCENE)
     run()
     wait("a picture is shown", lambda: page.at("pictures").is_displayed() and "cycle" in page.picture())
     first = page.picture()
