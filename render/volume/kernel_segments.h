@@ -119,7 +119,6 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
         vf_gather_rows(list->items[0][0], at, segment);
         const vf t_out = segment[1];
         kernel_unit_segment run = kernel_unit_segment_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
-        kernel_light light = kernel_light_none();
         if (list->is_double) {
             vf_gather_rows(list->precise[0][0], at, precise);
             run.length = precise[0];
@@ -130,10 +129,13 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
             kernel_emit_segment(p, list, has, t_in, t_out, &run);
             continue;
         }
-        if (pieces->preintegral)
-            light = kernel_preintegrated(pieces, has, &run, &ends[n & 1], &ends[~n & 1]);
-        else
+        kernel_light light;
+        if (pieces->preintegral) {
+            kernel_preintegrated(pieces, has, &run, &ends[n & 1], &ends[~n & 1], &light);
+        } else {
+            light = kernel_light_none();
             kernel_integrate(pieces, has, &run, &light);
+        }
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, list, t_in, t_out)));
         if (p->frame->job->reproducible)
             kernel_emit_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
