@@ -1,12 +1,12 @@
 /* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
  *
- * The cells that such a ray meets must not depend on the partition. The rays are traced by the functions for primary
- * rays. These decide whether and where a ray crosses a face only from the positions of the face's vertices in tile
- * space. So the tile space must depend only on the ray; then the result depends only on the ray and the cell. For the
- * rays of a hit's hemisphere, the eye of the tile space is the hit, and depth is measured along the hit's normal. For
- * rays to a light, depth is measured along the light's direction. The plane perpendicular to this direction is divided
- * into square tiles, and a ray belongs to the tile in which it crosses the plane. A bundle is a set of rays with the
- * same tile space. The result does not depend on which of them are in one bundle. */
+ * The cells that such a ray meets must not depend on the partition of the mesh among ranks. The rays are traced by the
+ * functions for primary rays. These functions decide only from the positions of a face's vertices in tile space whether
+ * and where a ray crosses the face. So the tile space must depend only on the ray; then the result depends only on the
+ * ray and the cell. For the rays of a hit's hemisphere, the eye of the tile space is the hit, and depth is measured
+ * along the hit's normal. For rays to a light, depth is measured along the light's direction. The plane perpendicular
+ * to this direction is divided into square tiles, and a ray belongs to the tile in which it crosses the plane. A bundle
+ * is a set of rays with the same tile space. The result does not depend on how rays are divided into bundles. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 
@@ -26,7 +26,8 @@ typedef struct kernel_bundle {
     /* One bit per ray: set as long as no opaque surface has been found that blocks the ray. Only rays whose bit is set
      * are traced. */
     uint64_t open;
-    /* The rays in tile space. Each is traced from depth t_near to t_far. */
+    /* The rays in this tile space: at depth Z they are at origin + slope * Z. Each ray is traced from depth t_near to
+     * t_far. */
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];

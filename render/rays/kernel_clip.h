@@ -1,10 +1,10 @@
-/* Computes the intervals of a ray that a job's clips (render.h) keep, in double. They depend only on the ray and are
- * the same on all ranks.
+/* Computes the intervals of a ray that a job's clips (render.h) keep, in double. The intervals depend only on the ray
+ * and the clips, and are the same on all ranks.
  *
- * Clips whose inside is kept leave one interval of a ray. Those of them that all layers share are applied first:
- * packets trace only that interval. For surfaces with further clips, each hit is tested. Volumes with further clips are
- * traced several times, for one interval of each ray at a time, because a clip that cuts out a body divides a ray into
- * several intervals. */
+ * Clips whose inside is kept leave one interval of a ray. Of these clips, those that apply to all layers are applied
+ * first: packets trace only the interval that they leave. If a surface has further clips, each of its hits is tested.
+ * If volumes have further clips, they are traced several times, for one interval of each ray at a time, because a clip
+ * that cuts out a body divides a ray into several intervals. */
 #ifndef RENDER_KERNEL_CLIP_H
 #define RENDER_KERNEL_CLIP_H
 
@@ -19,7 +19,7 @@ typedef struct kernel_ray_part {
     double begin, end;
 } kernel_ray_part;
 
-/* A ray in tree space: its points are base + t * direction. */
+/* A ray in scaled world coordinates (tree space of kernel_types.h): its points are base + t * direction. */
 typedef struct kernel_clip_ray {
     double base[3], direction[3];
 } kernel_clip_ray;
@@ -31,8 +31,8 @@ static inline double kernel_clip_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns the distance, in scaled units times the length of the plane's normal, from the ray's point at t = 0 to the
- * clip plane along the normal; negative if the point is beyond the plane. */
+/* Returns the distance from the ray's point at t = 0 to the clip plane, along the plane's normal, in scaled units and
+ * multiplied by the normal's length. It is negative if the point is beyond the plane. */
 static inline double kernel_clip_plane_distance(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
@@ -96,8 +96,9 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns one of the intervals that a set of clips leaves of a ray behind the depth `begin`. clips: one bit per clip of
- * the job; number: index of the interval, counted from 0. Returns KERNEL_NO_PART if there are fewer intervals. */
+/* Returns one of the intervals that a set of clips leaves of a ray at values of t above `begin`. clips: one bit per
+ * clip of the job; number: index of the interval, counted from 0. Returns KERNEL_NO_PART if there are fewer
+ * intervals. */
 static inline kernel_ray_part kernel_clip_find_interval(const render_job *job, uint32_t clips,
                                                         const kernel_clip_ray *ray, double begin, int number)
 {

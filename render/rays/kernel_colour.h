@@ -13,14 +13,14 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent. exponent: the
+/* Returns the transmittance of a sample, (1 - opacity)^exponent. opacity: opacity per unit distance; exponent: the
  * sample's length in unit distances (kernel_transfer.exponent). *absorbed becomes 1 minus the transmittance, computed
  * without cancellation. */
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
-    /* The rounding of 1 - opacity is an error of at most half a unit in the last place. `rest` is that error, by which
-     * the logarithm is corrected to first order. */
+    /* `clear` has a rounding error of at most half a unit in the last place. `rest` is this error; the logarithm is
+     * corrected by it to first order. */
     const vf rest = (1.0f - clear) - opacity;
     const vf safe = vf_max(clear, vf_set(1.2e-38f));
     const vf log = vf_select(vf_le(clear, vf_set(0)), vf_set(-1e30f), vf_log2(safe) + rest / safe * 1.4426950f);
@@ -63,8 +63,8 @@ SIMD_INLINE vf kernel_find_colour_table_position(const kernel_transfer *t, vf x)
     return t->scale == RENDER_LINEAR ? x : kernel_scaled_position(t, x);
 }
 
-/* Computes the colour at the position `along` in the colour table, from 0 at its first to 1 at its last entry; NaN
- * gives the first colour. */
+/* Computes the colour at a position in the colour table. along: 0 at the table's first entry, 1 at its last; NaN gives
+ * the first colour. */
 SIMD_INLINE void kernel_look_up_colour(const kernel_transfer *t, vf along, vf out[3])
 {
     const vf place = vf_clamp(along, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
@@ -88,7 +88,7 @@ SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
     kernel_look_up_colour(t, kernel_find_colour_table_position(t, x), out);
 }
 
-/* Returns the opacity at a position in the colour table. */
+/* Returns the opacity at a position in the colour table (kernel_find_colour_table_position()). */
 SIMD_INLINE vf kernel_opacity_at(const kernel_transfer *t, vf place)
 {
     vf a = vf_set(t->base_opacity);
@@ -106,8 +106,8 @@ SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
 {
-    /* the vector is divided by its largest component first, which prevents overflow for gradients of fields of 1e30 or
-     * 1e-30 */
+    /* the vector is divided by its largest component first, because the squares of components of 1e30 would overflow,
+     * and those of 1e-30 underflow */
     const vf largest = vf_max(vf_abs(v[0]), vf_max(vf_abs(v[1]), vf_abs(v[2])));
     *is_zero = vm_not(vf_lt(vf_set(0), largest));
     const vf scale = 1.0f / vf_select(*is_zero, vf_set(1), largest);
@@ -203,8 +203,8 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
     }
 }
 
-/* Computes colours from tables with bands of constant colour, or with separate colours for values outside the range and
- * NaN. w: the values, in the transfer function's domain. */
+/* Computes colours from a table that has bands of constant colour, or separate colours for NaN and for values outside
+ * the table's range. w: the values, in the transfer function's domain. */
 static __attribute__((noinline)) void kernel_special_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_find_colour_table_position(t, w), one = vf_set(1), zero = vf_set(0);

@@ -4,8 +4,9 @@
 
 #include "simd.h"
 
-/* Returns 2^x for x <= 0, with a relative error of 2e-7; 0 below -126. It uses the Taylor series of 2^f for f in [-1/2,
- * 1/2], whose first omitted term is (f ln 2)^7 / 7! < 1.2e-7. */
+/* Returns 2^x for x <= 0, with a relative error of 2e-7; 0 below -126. x is rounded to an integer, and 2 to the power
+ * of the remainder f in [-1/2, 1/2] is computed by a Taylor series, whose first omitted term is (f ln 2)^7 / 7! <
+ * 1.2e-7. */
 SIMD_INLINE vf vf_exp2(vf x)
 {
     const vf whole = vf_floor(x + 0.5f);

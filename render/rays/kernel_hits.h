@@ -24,10 +24,11 @@ typedef struct kernel_hits {
      * normals come from differences */
     vf reach;
     vf kind;
-    /* number of rows of `cut` in use: the largest number of crossings of a ray; 0 if the frame has no volumes */
+    /* number of entries of `cut` in use: the largest number of crossings that a ray has; 0 if the frame has no
+     * volumes */
     int cut_count;
-    /* Depths t at which the rays cross transparent surfaces. Row n has, for each ray, the crossing that was found as
-     * the ray's n-th; the crossings of a ray are not sorted by depth. +inf: the ray has no n-th crossing. */
+    /* Depths t at which the rays cross transparent surfaces. cut[n] has, for each ray, the n-th crossing that was found
+     * (n = 0, 1, ...), or +inf if the ray has no further crossing. The crossings of a ray are not sorted by depth. */
     vf cut[KERNEL_MAX_CUTS];
     vm overflowed; /* rays with more than KERNEL_MAX_CUTS crossings; the excess crossings are not stored */
 } kernel_hits;
@@ -41,7 +42,7 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 
-/* Adds a crossing at t to the ray in lane `ray`. Each ray fills its own lane from row 0 on, whatever the other rays of
+/* Adds a crossing at t to the ray in lane `ray`. Each ray fills its own lane from cut[0] on, whatever the other rays of
  * the packet do. So the depths at which a ray's fragments are split do not depend on the other rays. */
 static inline void kernel_hits_add_crossing(kernel_hits *hits, int ray, float t)
 {

@@ -25,10 +25,10 @@ typedef struct kernel_packet {
     bool has_view;
     /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* Set if edge functions are computed on the rays from the lines of the cells' edges (kernel_cell.h). A line is an
-     * affine function of (u, v), which is a camera ray's slope or, if the camera is orthographic, its origin. Lines are
-     * used for camera rays through the tile's pixels, except for segments of volumes. For all other rays, edge
-     * functions are computed from projected vertices. */
+    /* Set if the edge functions of rays are computed from lines (kernel_cell.h). The line of a cell's edge is its edge
+     * function as an affine function of (u, v), which is a camera ray's slope or, if the camera is orthographic, its
+     * origin. Lines are used for camera rays through the tile's pixels, except for segments of volumes. For all other
+     * rays, edge functions are computed from projected vertices. */
     bool is_pencil;
     vf u, v;
     vf t_near; /* t at which the rays begin: that of the eye's plane, or clip_in if that is farther */
@@ -40,12 +40,12 @@ typedef struct kernel_packet {
      * sample_step */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval of t that clips leave of each ray. While volumes with clips of their own are traced, these are the
-     * clips of volumes; otherwise they are the common clips. Without clips the interval is from -inf to +inf. Set only
-     * if the frame has volumes or common clips. */
+    /* The interval of t that clips leave of each ray: the clips of volumes, while volumes with clips of their own are
+     * traced; otherwise the clips that all layers share (kernel_frame.common_clips). Without clips the interval is from
+     * -inf to +inf. Set only if the frame has volumes or common clips. */
     vf clip_in, clip_out;
     /* Exact length of the interval from clip_in to clip_out, divided by the difference of these two rounded numbers.
-     * The ratio is far from 1 if a ray grazes a sphere, so that the interval is very short. */
+     * The ratio is far from 1 only if the interval is very short, for example because the ray grazes a sphere. */
     vf clip_length_ratio;
     /* Saved values of active, t_near and t_far after the surfaces have been traced. They are restored for each of the
      * intervals that the clips of volumes leave (kernel_packet_clip_volumes()). */
@@ -56,8 +56,9 @@ typedef struct kernel_packet {
 /* A packet covers a rectangle of 4 × 4, 4 × 2 or 2 × 2 pixels, for vectors of 16, 8 or 4 lanes. */
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
-/* Computes a ray in tree space: its point at t is base + t * direction. px, py: slope or offset of the ray's column and
- * row of pixels (kernel_column_slope(), kernel_row_slope()). */
+/* Computes a ray in the scaled world coordinates that kernel_types.h calls tree space: its point at t is base + t *
+ * direction. px, py: slope (perspective) or offset (orthographic) of the ray's column and row of pixels
+ * (kernel_column_slope(), kernel_row_slope()). */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -71,7 +72,8 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Computes the slopes or offsets of the columns and rows of a packet's rays (px and py of kernel_tree_ray()). */
+/* Computes, for each ray of a packet, the slope (perspective) or offset (orthographic) of its column (px) and of its
+ * row (py) of pixels. */
 static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
@@ -195,8 +197,8 @@ static __attribute__((noinline, cold)) void kernel_packet_set_clip_interval(kern
     p->clip_length_ratio = vf_load(stretch);
 }
 
-/* Restricts the packet's rays to the interval that the frame's common clips leave, and deactivates rays of which
- * nothing is left. */
+/* Restricts the packet's rays to the interval that the clips of all layers (kernel_frame.common_clips) leave, and
+ * deactivates rays of which nothing is left. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
     kernel_packet_set_clip_interval(p, p->frame->common_clips, 0);
@@ -205,8 +207,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Restricts each of the packet's rays to one of the intervals that the clips of volumes leave of it: the one with the
- * index `turn`, counted from 0. All surfaces must have been traced before. */
+/* Restricts each of the packet's rays to the interval with the index `turn`, counted from 0, among the intervals that
+ * the clips of volumes leave of the ray. All surfaces must have been traced before. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {
@@ -251,13 +253,14 @@ typedef struct kernel_rays {
 } kernel_rays;
 
 /* A point of each ray inside a cell. t: depth; value: the field there; r: reference coordinates in the cell. mask: the
- * rays that have such a point. It is set for crossings of faces, and otherwise only if a function's comment says so. */
+ * rays that have such a point; functions that compute crossings of faces set the mask, others only if their comment
+ * says so. */
 typedef struct kernel_point {
     vf t, value, r[3];
     vm mask;
 } kernel_point;
 
-/* Copies the points of the rays in the mask; other lanes of *to are unchanged. */
+/* Copies the points of the rays in `mask`, except their member `mask`; other lanes of *to are unchanged. */
 SIMD_INLINE void kernel_point_copy_lanes(vm mask, const kernel_point *from, kernel_point *to)
 {
     to->t = vf_select(mask, from->t, to->t);

@@ -13,10 +13,10 @@
  * Each plane is one lane of a vector, which holds a point's signed distance from the plane. Two more lanes hold the
  * point's depth and its distance along the direction of the tile's middle ray. So the least and the greatest of each of
  * these numbers in a body are computed at once; they are called the body's extent in the lane. Planes through the eye
- * give correct masks only for bodies in front of the eye; all others lie before the rays begin. A body that intersects
- * the eye's plane lies on both sides of the borders of all blocks in which it may be visible, so these blocks are in
- * the mask. Bodies are extended by more than all rounding, so masks are never too small. Masks only select where to
- * test; they never change the result. */
+ * give correct masks only for bodies in front of the eye. Rays begin in the eye's plane, so they do not meet bodies
+ * behind it. A body that intersects the eye's plane lies on both sides of the borders of all blocks in which it may be
+ * visible, so these blocks are in the mask. Extents are widened by more than all rounding errors, so no block is
+ * missing in a mask. Masks only select the rays that are tested with a body; they never change the result. */
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
@@ -78,8 +78,9 @@ enum {
     KERNEL_LANE_VECTORS = KERNEL_LANES / SIMD_WIDTH
 };
 
-/* One plane per lane: a position's signed distance from it is normal · position + offset. size: absolute values of the
- * normal's components; error: upper bound of the rounding error of the distance at positions near the scene. */
+/* One plane per lane: the signed distance of a position from the plane is normal · position + offset. size: absolute
+ * values of the normal's components; error: upper bound of the rounding error of the distance at positions near the
+ * scene. */
 typedef struct kernel_planes {
     vf normal[3][KERNEL_LANE_VECTORS], size[3][KERNEL_LANE_VECTORS];
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
@@ -97,10 +98,10 @@ static inline void kernel_compute_block_borders(const kernel_frame *f, const ker
     }
 }
 
-/* Computes, in double, the planes of the block borders and the two lanes for depths (KERNEL_DEPTH_LANE,
- * KERNEL_ALONG_LANE). axes: components of the normals along the camera's right, up and forward axes; offset: the
- * planes' offsets if positions are counted from the eye. The positive side of a border's plane is that of greater
- * columns or rows. */
+/* Computes, in double, normals and offsets of the planes of the block borders, and those of the two lanes for depths
+ * (KERNEL_DEPTH_LANE, KERNEL_ALONG_LANE). axes: components of the normals along the camera's right, up and forward
+ * axes; offset: the planes' offsets for positions relative to the eye. The positive side of a border's plane is that of
+ * greater columns or rows. */
 static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_tile *tile, double axes[3][KERNEL_LANES],
                                           double offset[KERNEL_LANES])
 {
@@ -125,7 +126,7 @@ static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_ti
     axes[1][KERNEL_ALONG_LANE] = flat || !tile ? 0 : tile->centre_y;
 }
 
-/* Loads planes from lists with one number per lane. */
+/* Loads the planes from arrays of their normals, offsets and error bounds, with one entry per lane. */
 static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KERNEL_LANES], const float *offset,
                                       const float *error)
 {
@@ -139,8 +140,9 @@ static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KE
     }
 }
 
-/* Computes the planes of the tile, or of the whole picture if tile is NULL, in tree space, for boxes. Normals are
- * rounded before the offsets are computed, so that the planes still pass through the eye. The remaining error is a
+/* Computes the planes against which the boxes of tree nodes are tested, in the coordinates of the trees (tree space of
+ * kernel_types.h). The planes are those of the tile's block borders, or of the whole picture if tile is NULL. Normals
+ * are rounded before the offsets are computed, so that the planes still pass through the eye. The remaining error is a
  * rotation of the planes about the eye by the rounding of the normals. */
 static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
@@ -159,10 +161,10 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* Upper bound of the rounding error of a distance, in roundings (6e-8). Positions near the scene and the eye have
-     * magnitudes of at most size + 1. The sum of three products errs by at most 4 roundings of this magnitude times the
-     * 1-norm of the normal. The centre and the half widths of a box add 1 rounding, and the normal and the offset 1
-     * more. The bound below has 16 roundings. */
+    /* Upper bound of the rounding error of a distance, counted in roundings; one rounding is a relative error of 6e-8.
+     * Positions near the scene and the eye have magnitudes of at most size + 1. The sum of three products errs by at
+     * most 4 roundings of this magnitude times the 1-norm of the normal. The centre and the half widths of a box add 1
+     * rounding, and the normal and the offset 1 more. The bound below has 16 roundings. */
     for (int i = 0; i < KERNEL_LANES; i++) {
         offset[i] = (float)exact[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));
@@ -170,9 +172,10 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
     kernel_planes_load(q, normal, offset, error);
 }
 
-/* Computes the planes in tile space, against which cells are tested. The signed distance of a position from the plane
- * of a border between columns is X - slope * Z - origin, where slope and origin are those of the border. For borders
- * between rows it is slope * Z + origin - Y. The lane of the distance along the tile's middle ray is not used. */
+/* Computes the planes against which the vertices of cells are tested, in tile space (kernel_types.h). The signed
+ * distance of a position from the plane of a border between columns is X - slope * Z - origin, where slope and origin
+ * are those of the border. For borders between rows it is slope * Z + origin - Y. The lane of the distance along the
+ * tile's middle ray is not used. */
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -195,14 +198,14 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
     kernel_planes_load(q, normal, offset, error);
 }
 
-/* The result of classifying a body. */
+/* Where a body (the box of a tree's node, or a cell) lies relative to the planes of a tile's block borders. */
 typedef struct kernel_placement {
     /* Masks of planes, one bit per lane. below: planes for which part of the body has a distance <= 0; above: those for
      * which part has a distance >= 0. The bit of a plane that cuts the body is set in both. */
     unsigned below, above;
-    unsigned blocks; /* the blocks that the body may meet */
-    /* near, far: the body's least and greatest depth; along: distance of a box's middle along the tile's middle ray, by
-     * which boxes are sorted */
+    unsigned blocks; /* mask of the blocks in which the body may be visible */
+    /* near, far: the body's least and greatest depth; along: position of a box's middle along the direction of the
+     * tile's middle ray, by which child nodes are sorted */
     float near, far, along;
 } kernel_placement;
 
@@ -226,8 +229,8 @@ SIMD_INLINE void kernel_placement_find_blocks(kernel_placement *placement)
     placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
-/* Computes the extent of a node's box in all lanes (see the top of this file), and from this the blocks in which the
- * box may be visible. */
+/* Computes the least and the greatest signed distance of a node's box from each plane, and from these the blocks in
+ * which the box may be visible. */
 SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
@@ -246,12 +249,13 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* Margin by which the extent of a cell's points is widened, relative to the size of their coordinates. It is larger
- * than all rounding errors, so that a ray that hits the cell only by rounding is still inside. */
+/* Margin by which the range of a cell's distances from a plane is widened, relative to the magnitude of the terms of a
+ * distance. It is larger than all rounding errors, so that the blocks also contain rays that hit the cell only because
+ * of rounding. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-/* Computes the extent of points in all lanes (see the top of this file), and from this the blocks in which their convex
- * hull may be visible. places: x, y and z of the points in tile space. */
+/* Computes the least and the greatest signed distance of points from each plane, and from these the blocks in which the
+ * points' convex hull may be visible. places: x, y and z of the points in tile space. */
 SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, const float *const places[3], int count)
 {
     kernel_placement placement = {0};

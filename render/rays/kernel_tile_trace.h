@@ -1,7 +1,7 @@
-/* The state of the tile that a thread is tracing: its rays, the depths of its blocks' nearest hits, and its traversal
- * of a tree. A block's packets are set up when the first cell is found that may be visible in the block. The last part
- * defines lists of rays, in which each ray has a cell of its own, so that the pixels of several small cells are
- * processed in one vector. */
+/* The state of the tile that a thread is tracing: the tile's rays, the depth in each block behind which everything is
+ * hidden, and the traversal of a tree for all rays of the tile. A block's packets are set up when the first cell is
+ * found that may be visible in the block. The last part defines lists of rays, in which each ray has a cell of its own,
+ * so that the pixels of several small cells are processed in one vector. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 
@@ -154,9 +154,9 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
 }
 
 /* A node on the stack of a tile that traverses a tree. There are two traversals. In the traversal by blocks, `place` is
- * a mask of the blocks in which the node may be visible; blocks in which nearer hits hide the node are removed when it
- * is taken from the stack. In the traversal by pixels (kernel_tile_surface.h), `place` is the box of the pixels in
- * which the node may be visible. */
+ * a mask of the blocks in which the node may be visible; when the node is taken from the stack, the blocks in which
+ * nearer hits hide it are removed from the mask. In the traversal by pixels (kernel_tile_surface.h), `place` is the box
+ * of the pixels in which the node may be visible. */
 typedef struct kernel_tile_node {
     /* index of the node; or, in traversals by pixels, index of a leaf's first cell or of an inner node's left child */
     int64_t ref;
@@ -167,9 +167,9 @@ typedef struct kernel_tile_node {
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
-/* Returns the node's placement. Its `blocks` are those of the given blocks in which the node may be visible; none if
- * the node contains no visible value or ends in front of the depth t->t_near. visible_values: NULL if all values are
- * visible. */
+/* Returns the placement of a node's box. The member `blocks` of the result is a mask of those of the given blocks in
+ * which the node may be visible; it is 0 if the node contains no visible value or ends before the depth t->t_near.
+ * visible_values: NULL if all values are visible. */
 SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
                                                        const mmbvh_ranges *ranges,
                                                        const kernel_visible_values *visible_values, int64_t node,
@@ -257,7 +257,8 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
 /* Appends the rays of all pixels of the given blocks, packet by packet. lane: the lane that holds the rays' cell. */
 SIMD_INLINE void kernel_pixel_list_add_blocks(kernel_pixel_list *rays, unsigned blocks, int lane)
 {
-    /* pixels of the tile's first block by position in the block (kernel_pixel_position()) */
+    /* the pixels of the tile's first block (16 * row + column), in the order of packets and lanes
+     * (kernel_pixel_position()); quads: for vectors of 4 lanes, rows: for all others */
     static const uint8_t quads[16] = {0, 1, 16, 17, 2, 3, 18, 19, 32, 33, 48, 49, 34, 35, 50, 51};
     static const uint8_t rows[16] = {0, 1, 2, 3, 16, 17, 18, 19, 32, 33, 34, 35, 48, 49, 50, 51};
     typedef uint8_t kernel_block_bytes __attribute__((vector_size(KERNEL_BLOCK * KERNEL_BLOCK)));
@@ -273,8 +274,8 @@ SIMD_INLINE void kernel_pixel_list_add_blocks(kernel_pixel_list *rays, unsigned 
     }
 }
 
-/* Pads the list with copies of its last ray, so that its last rays can be read as a whole vector of rays whose packets
- * have been set up. */
+/* Stores SIMD_WIDTH copies of the last ray behind the end of the list. So a whole vector can be read from any index of
+ * the list, and the packets of all rays in the vector have been set up. */
 SIMD_INLINE void kernel_pixel_list_pad(kernel_pixel_list *rays)
 {
     const int last = rays->count - 1;
@@ -308,7 +309,7 @@ SIMD_INLINE vf kernel_gather_packet_member(const void *of_first, vi at)
     return vf_gather((const float *)of_first, at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* The rays of SIMD_WIDTH pixels, one per lane, each of which has a cell of its own. */
+/* SIMD_WIDTH rays, one per lane. Each ray is intersected with a cell of its own. */
 typedef struct kernel_lane_rays {
     /* lane: the lane that holds the ray's cell in the vectors of cells; at: position of the ray's pixel among the
      * tile's packets (kernel_pixel_position()) */
@@ -321,8 +322,8 @@ typedef struct kernel_lane_rays {
     vf far;  /* t of the ray's nearest hit so far (kernel_packet.t_far); set only when surfaces are traced */
 } kernel_lane_rays;
 
-/* Sets the members lane, at and rays to the rays through the given pixels of the tile (16 * row + column). lane: lane
- * of each ray's cell. */
+/* Sets the members lane, at and rays for the rays through the given pixels of the tile (16 * row + column). lane: the
+ * lane that holds each ray's cell. */
 SIMD_INLINE void kernel_lane_rays_through_pixels(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
 {
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
@@ -368,13 +369,14 @@ SIMD_INLINE int kernel_packet_of_pixel(int pixel)
     return block * KERNEL_BLOCK_PACKETS + within;
 }
 
-/* Returns the positions of a packet's rays among the tile's packets. */
+/* Returns, for each ray of a packet, its position among the rays of the tile's packets (kernel_pixel_position()). */
 SIMD_INLINE vi kernel_packet_places(int packet)
 {
     return packet * SIMD_WIDTH + vi_lanes();
 }
 
-/* Sets the rays to all rays of a packet, which share the cell in the given lane. packet: its index in the tile. */
+/* Sets *out to the rays of a packet, all of which are intersected with the cell in the given lane. packet: index of the
+ * packet in the tile. */
 SIMD_INLINE void kernel_lane_rays_of_packet(kernel_lane_rays *out, const kernel_tile_trace *t, int packet, int lane)
 {
     const kernel_packet *p = &t->packets[packet];

@@ -41,8 +41,9 @@ enum {
 _Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
 
 /* KERNEL_BLACK: a segment is integrated only until its transmittance falls below this value. KERNEL_SHORT: no
- * integration step needs to be shorter than this, in unit distances (render_transfer). Nor does a step need to be
- * shorter than this fraction of the ray's length in one piece of the transfer function (kernel_integral.h). */
+ * integration step needs to be shorter than this, in unit distances (render_transfer). A step also does not need to be
+ * shorter than KERNEL_SHORT times the length of the ray's part in one piece of the transfer function
+ * (kernel_integral.h). */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
@@ -55,17 +56,17 @@ typedef float kernel_real;
 
 enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
-/* Entries of a piece of a transfer function. A piece is a range of values, from low to high, on which opacity and
- * colour are linear. At a value x in this range, the opacity is the opacity at `low` plus (x - low) times its slope.
- * Each channel of the colour is computed in the same way. 1 - opacity is stored separately, because near an opacity of
- * 1 the computed difference would consist of rounding errors only. The function is constant below its first and above
- * its last point. The infinite ends of the first and the last piece are replaced by -+2^100, so that
- * KERNEL_PIECE_INVERSE times the width is still 1. */
+/* Entries of a piece of a transfer function. A piece is a range of values of the field, from low to high, on which
+ * opacity and colour are linear functions of the value. At a value x in this range, the opacity is the opacity at `low`
+ * plus (x - low) times its slope. Each channel of the colour is computed in the same way. 1 - opacity is stored
+ * separately, because near an opacity of 1 the computed difference would consist of rounding errors only. The function
+ * is constant below its first and above its last point. So the first piece begins at -infinity and the last ends at
+ * +infinity; these two are replaced by -2^100 and 2^100, so that KERNEL_PIECE_INVERSE times the width is still 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
-    /* Exact end of the piece minus KERNEL_PIECE_LOW or KERNEL_PIECE_HIGH, which are rounded to kernel_real; 0 unless
-     * kernel_pieces.has_rests is set. */
+    /* Exact lower and upper end of the piece minus KERNEL_PIECE_LOW and KERNEL_PIECE_HIGH, which are the ends rounded
+     * to kernel_real; 0 unless kernel_pieces.has_rests is set. */
     KERNEL_PIECE_LOW_REST,
     KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
@@ -85,11 +86,12 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Entries of a row of kernel_pieces.variations: bounds over a range of values in which the opacity has no step. Suppose
- * that the field has a small error e along one unit distance of a ray, and that this changes a channel of the pixel's
- * light by g e. g depends on the field's value and on the light that comes from behind this place. KERNEL_LIGHT_COST is
- * the maximum of |g| over the range of values and over all colours of that light. KERNEL_LIGHT_VARIATION is the largest
- * difference between the g of two values of the range, for the same channel and the same light from behind. */
+/* Entries of kernel_pieces.variations[i]: upper bounds over one range of values, in which the opacity has no step.
+ * Suppose that the field has a small error e along one unit distance of a ray, and that this changes a channel of the
+ * pixel's light by g e. g depends on the field's value there and on the light that comes from farther along the ray.
+ * KERNEL_LIGHT_COST is the maximum of |g| over the range of values and over all colours of that light.
+ * KERNEL_LIGHT_VARIATION is the largest difference between the g of two values of the range, for the same channel and
+ * the same light from behind. */
 enum {
     KERNEL_LIGHT_VARIATION,
     KERNEL_LIGHT_COST,
@@ -104,10 +106,11 @@ enum {
  * depth_unit, or the average emission in units of light_unit (kernel_preintegral). The struct is read as rows of four
  * floats. */
 typedef struct kernel_preint_entry {
-    int32_t before[4]; /* sums over all earlier bins */
+    int32_t before[4]; /* sums over all bins before this one */
     float own[4];      /* sums over this bin; integers, stored as floats */
     int32_t colour;    /* colour at the bin's middle, 10 bits per channel, in units of colour_unit */
-    /* error bound of a segment's light per unit distance, due to the variation of extinction and emission in the bin */
+    /* upper bound of the error of a segment's light, per unit distance of the segment, that arises because extinction
+     * and emission vary within the bin but are stored as one average */
     float table_error;
     float unused[2];
 } kernel_preint_entry;
@@ -118,15 +121,15 @@ typedef struct kernel_preintegral {
     kernel_preint_entry *entries; /* array of bin_count + 2 bins */
     float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
     float depth_unit, light_unit; /* units of the sums of extinctions and of emissions (kernel_preint_entry) */
-    /* colour_unit: unit of packed colours; colour_error: upper bound of the deviation of a colour from that of its bin
-     */
+    /* colour_unit: unit of packed colours; colour_error: upper bound of the difference between the colour at a value
+     * and the colour stored for its bin */
     float colour_unit, colour_error;
     /* Over a range of values of width h, let the chord be the linear function that equals a colour channel at both ends
      * of the range. The channel deviates from its chord by at most h (h bend_square + bend) + colour_error. If the
      * range extends beyond the ends of the colour table, the smaller of h bend_at_ends and contrast is added. */
     float bend_square, bend, bend_at_ends, contrast;
-    /* error of light that a segment may have: allowed_absorbed per unit of its absorption, plus allowed_length per unit
-     * distance of its length */
+    /* The light of a segment may have an error of at most allowed_absorbed times the segment's absorption (1 -
+     * transmittance) plus allowed_length times its length in unit distances. */
     float allowed_absorbed, allowed_length;
 } kernel_preintegral;
 
@@ -138,23 +141,26 @@ typedef struct kernel_pieces {
      * begins at bin_low. bin_first contains, for each bin, the index of the piece in which the bin begins. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS. The row is chosen by
-     * the width of the range, and the column by the bin in which the range begins (kernel_light_bounds()). These bins
-     * have the width 1 / variation_inverse, and the first begins at bin_low. */
+    /* A table of KERNEL_VARIATION_WIDTHS rows and KERNEL_VARIATION_BINS columns, row by row, with upper bounds over
+     * ranges of values (KERNEL_LIGHT_VARIATION and so on). The row is chosen by the width of the range, and the column
+     * by the bin in which the range begins (kernel_light_bounds()). The bins of this table have the width 1 /
+     * variation_inverse, and the first begins at bin_low. */
     float variation_inverse;
     float (*variations)[KERNEL_LIGHT_ENTRIES];
     /* Set if the opacity rises or falls so steeply that the rounding of a piece's ends to kernel_real would be visible.
      * The rounding errors of the ends (KERNEL_PIECE_LOW_REST) are then added to the ends. */
     bool has_rests;
     int step_count;
-    /* values at which the opacity has a step, sorted; pieces end at these values, rounded to kernel_real */
+    /* values at which the opacity has a step, sorted; at each of them, rounded to kernel_real, one piece ends and the
+     * next begins */
     double steps[RENDER_MAX_OPACITY_POINTS];
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
     kernel_preintegral *preintegral; /* table of sums; NULL if the job allows no error (max_error) */
 } kernel_pieces;
 
-/* Returns the rounded value at which the pieces on both sides of a step of the opacity end. */
+/* Returns the value at which the piece below a step of the opacity ends and the piece above it begins: the value of the
+ * step, rounded to kernel_real. */
 static inline float kernel_rounded_step(double step)
 {
     return (float)(kernel_real)step;
@@ -173,8 +179,8 @@ typedef struct kernel_tile {
     float radius;
 } kernel_tile;
 
-/* Intervals of visible values, rounded outward: nodes and cells whose range of values overlaps none of them are
- * skipped. */
+/* Intervals of field values at which a surface or volume is visible, rounded outward. Nodes and cells whose range of
+ * values overlaps none of these intervals are skipped. */
 typedef struct kernel_visible_values {
     int count;
     mmbvh_interval intervals[KERNEL_MAX_INTERVALS];
@@ -203,7 +209,8 @@ typedef struct kernel_transfer {
     float base_opacity;
     float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];
     float ramp_rise[RENDER_MAX_OPACITY_POINTS];
-    float exponent; /* step / unit_distance; a sample's transmittance is (1 - opacity) to this power */
+    /* distance between samples / unit_distance; a sample's transmittance is (1 - opacity) to this power */
+    float exponent;
     kernel_visible_values visible_values;
 } kernel_transfer;
 
@@ -221,15 +228,16 @@ typedef struct kernel_surface {
     kernel_visible_values visible_values; /* the visible values: the layer's isovalues */
     kernel_transfer colour;               /* transfer function of the colour field; set if the layer has a colour_map */
     kernel_lines lines;                   /* contour lines on the surface; set if the layer has lines */
-    /* this layer's clips that are not among the frame's common_clips; one bit per clip of the job */
+    /* mask of this layer's clips that are not among the frame's common_clips; bit i stands for clip i of the job */
     uint32_t own_clips;
     uint32_t first_kind; /* fragment kind (fragment.h) of the layer's first isovalue */
-    /* power of two that scales the width of the field's range to near 1; set for normals by differences */
+    /* power of two by which values are multiplied, so that the width of the field's range is near 1; set if normals are
+     * computed from differences (RENDER_DIFFERENCES) */
     double value_scale;
 } kernel_surface;
 
-/* A candidate: a cell in which an isosurface or the volume may be visible. near, far: its range of t; x0, x1, y0, y1:
- * first and last column, first and last row of the pixels that it may cover. */
+/* A candidate: a cell in which an isosurface or the volume may be visible. near, far: least and greatest t in the cell;
+ * x0, x1, y0, y1: first and last column, first and last row of the pixels that the cell may cover. */
 typedef struct kernel_candidate {
     uint32_t cell;
     /* for a surface: index of the mesh part * RENDER_MAX_ISOVALUES + index of the isovalue in the frame; for a volume:
@@ -239,8 +247,9 @@ typedef struct kernel_candidate {
     uint16_t x0, x1, y0, y1;
 } kernel_candidate;
 
-/* A candidate as stored for one tile. blocks: one bit for each of the tile's blocks in which it may be visible. box:
- * first and last column, first and last row of its pixels within the tile, 4 bits each, from bit 0 on. */
+/* A candidate as stored for one tile. blocks: one bit for each of the tile's blocks in which the cell may be visible.
+ * box: first and last column, first and last row, relative to the tile, of the pixels that the cell may cover; 4 bits
+ * each, from bit 0 on. */
 typedef struct kernel_tile_candidate {
     float near;
     union {
@@ -251,11 +260,11 @@ typedef struct kernel_tile_candidate {
     uint16_t blocks, box;
 } kernel_tile_candidate;
 
-/* A tile's cells are sorted by depth into KERNEL_DEPTHS bins, without an order within a bin. That is accurate enough to
- * skip cells that are hidden. */
+/* Number of depth bins (ranges of depth) into which a tile's candidates are sorted. The candidates of one depth bin are
+ * not sorted. This order is accurate enough to skip cells that nearer hits hide. */
 enum { KERNEL_DEPTHS = 32 };
 
-/* The candidates of a tile, in any order; kernels may reorder them. */
+/* The candidates of one tile, in any order. Kernels may reorder them. */
 typedef struct kernel_bin {
     kernel_tile_candidate *items;
     int count;
@@ -308,7 +317,8 @@ typedef struct kernel_frame {
     int surface_count, volume_count;
     kernel_surface *surfaces; /* surface layers, the opaque ones first */
     int opaque_count;
-    /* for each isovalue of the frame, the index of its surface, and its index among the surface's isovalues */
+    /* for each isovalue of the frame: index in `surfaces` of the layer that has it, and the isovalue's index in this
+     * layer */
     int isovalue_surface[RENDER_MAX_ISOVALUES], isovalue_number[RENDER_MAX_ISOVALUES];
     /* binned candidates of surfaces (render_candidates.c); NULL if tiles traverse the trees themselves */
     struct kernel_bins *candidates;
@@ -318,33 +328,38 @@ typedef struct kernel_frame {
      * row in cover[1]; set only if needs_planes */
     int cover[2][2];
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
-    double scaled_axes[3][3]; /* right, up, forward, each times the space's scale */
-    double depth_shift;       /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
+    /* the camera's axes right, up and forward, in world coordinates, each times the space's scale */
+    double scaled_axes[3][3];
+    double depth_shift; /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
     /* In pixel column x the ray has the slope (or, if the camera is orthographic, the offset) slope_x0 + x * slope_dx.
      * Rows have slope_y0 + y * slope_dy. */
     double slope_x0, slope_dx;
     double slope_y0, slope_dy;
     double scaled_step;                          /* distance between samples in scaled units: the job's step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* unit vectors to the lights, in camera axes */
-    /* the clips that apply to all layers and that leave a single interval of a ray; one bit per clip of the job */
+    /* mask of the clips that apply to all layers and leave at most one interval of each ray; bit i stands for clip i of
+     * the job */
     uint32_t common_clips;
-    /* Maximum number of intervals that the clips of volumes may leave of a ray; 0 if volumes have no clips of their
-     * own. */
+    /* Upper bound of the number of intervals that the clips of volumes leave of a ray; 0 if volumes have no clips of
+     * their own. */
     int volume_intervals;
     bool has_transparent;
-    bool has_polyhedra; /* set if a mesh part has them */
-    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
-    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
+    bool has_polyhedra; /* set if at least one mesh part has polyhedra */
+    /* set if candidates of surfaces are searched for and binned by tile; tiles traverse the trees nevertheless if the
+     * cells are too small or too many */
+    bool is_binned;
+    bool bins_volume; /* set if candidates of the frame's only volume are searched for and binned by tile */
     /* set if tiles traverse the trees and therefore need the planes between their blocks (kernel_tile.h) */
     bool needs_planes;
     bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    /* Limits for segments. allowance: error of light that the approximation of the field may cause
+    /* Limits for segments of volumes. allowance: largest error of light that the approximation of the field may cause
      * (kernel_local_budget.h). If it is 0, segments of hexes, wedges and pyramids are at most as long as the sampling
-     * step. mixing: error of light that compositing may cause when it mixes overlapping segments. reach: per volume,
-     * upper bound of the length of a ray in the scene, in the volume's unit distances (render_transfer). */
+     * step. mixing: largest error of light that compositing may cause where segments of several volumes or cells
+     * overlap in depth. reach: per volume, upper bound of the length of a ray in the scene, in the volume's unit
+     * distances (render_transfer). */
     float allowance, mixing, reach[RENDER_MAX_VOLUMES];
     /* Set if volume fragments must end at gaps between this rank's cells, because other ranks may have surfaces
      * there. */
@@ -356,7 +371,8 @@ typedef struct kernel_thread {
     /* The thread's memory, which has kernel_table.memory_bytes bytes. kernel_table.begin() sets the pointers below to
      * parts of it. */
     void *memory;
-    struct kernel_cell *cells; /* cache of the cells that have been fetched for single packets (kernel_cell_cache.h) */
+    /* cache of cells that are traced one cell at a time, with packets (kernel_cell_cache.h) */
+    struct kernel_cell *cells;
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;
@@ -368,7 +384,8 @@ typedef struct kernel_thread {
     fragment_list out; /* fragments of the current tile */
     render_pending_list waiting; /* pending hits: hits whose normals need samples from the cells of other ranks */
     bool out_of_memory;
-    /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
+    /* counters for render_statistics: number of points whose reference coordinates could not be computed, and number of
+     * cells visited by volumes */
     int64_t map_failures, volume_cells;
     /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh part has any. */
     struct polyhedron_store *polyhedra;
@@ -386,14 +403,15 @@ struct kernel_occluder;
 struct kernel_occluders;
 struct kernel_secondary_rays;
 
-/* The functions that the object of one instruction set exports. */
+/* The kernels that are compiled for one instruction set. */
 typedef struct kernel_table {
     int width;
     size_t memory_bytes;
     void (*begin)(kernel_thread *thread); /* sets pointers into the thread's memory at the start of a frame */
     /* Traces the tile whose upper left pixel is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
-    /* Adds to the list the candidates of a subtree. grow() adds space, or marks the list as full. */
+    /* Appends the candidates of a subtree to the list. It calls grow() if the current chunk has too little space;
+     * grow() allocates another chunk, or marks the list as full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
     /* Secondary rays lead from hits to lights or into the hemisphere. Clears is_open of the secondary rays that an
@@ -403,11 +421,12 @@ typedef struct kernel_table {
     /* Clears the bits in bundle->open of the rays that the surface in this cell blocks. */
     void (*occlude_by_cell)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle,
                             const struct kernel_occluder *occluder);
-    /* Samples this rank's cells around each of `count` hits, for normals by central differences; out[i] belongs to
-     * hits[i]. */
+    /* Samples the field of this rank's cells at the six points around each of `count` hits, for normals by central
+     * differences; out[i] has the samples of hits[i]. */
     void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                            render_difference_samples *out, int64_t count);
-    /* Computes the fragments out[i] of `count` hits from the samples around them, samples[i]. */
+    /* Computes normals, shades `count` hits and stores their fragments: out[i] from hits[i], shadings[i]
+     * (render_pending_list.shadings) and the samples around the hit, samples[i]. */
     void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                           float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
                           int64_t count);

@@ -1,4 +1,5 @@
-/* Tests whether the range of values of a node or a cell contains a visible value. */
+/* Tests whether the range of field values in a tree's node or in a cell contains a value at which the layer is
+ * visible. */
 #ifndef RENDER_KERNEL_VISIBLE_VALUES_H
 #define RENDER_KERNEL_VISIBLE_VALUES_H
 

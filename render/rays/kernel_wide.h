@@ -1,7 +1,8 @@
-/* Vectors of doubles. Also defines how rays, one per lane, gather numbers of their cells from a vector in which each
- * lane holds the number of one cell. A kernel_f64 has SIMD_WIDTH / 2 doubles and fills one register, because compilers
- * split larger vectors and compare their lanes one by one. SIMD_WIDTH doubles, one per lane, are therefore stored as
- * two halves: half 0 has the first SIMD_WIDTH / 2 lanes, half 1 the others. A parameter `half` selects one of them. */
+/* Vectors of doubles. This file also defines kernel_gather_lane(), by which rays, one per lane, gather numbers of their
+ * cells from a vector whose lanes are cells. A kernel_f64 has SIMD_WIDTH / 2 doubles and fills one register, because
+ * compilers split larger vectors and compare their lanes one by one. SIMD_WIDTH doubles, one per lane, are therefore
+ * stored as two halves: half 0 has the first SIMD_WIDTH / 2 lanes, half 1 the others. A parameter `half` selects one of
+ * them. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -15,7 +16,8 @@ typedef vd kernel_f64;
 typedef int64_t kernel_f64_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_f64_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
-/* Returns of[lane] for each ray. of: one number per cell; lane: the lane that holds the ray's cell. */
+/* Returns of[lane] for each ray: the number that belongs to the ray's cell. of: one number per cell; lane: the lane
+ * that holds the ray's cell. */
 SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
@@ -85,7 +87,7 @@ SIMD_INLINE kernel_f64 kernel_f64_clamp(kernel_f64 v, double limit)
     return kernel_f64_select((kernel_f64_mask)(most < v), most, v);
 }
 
-/* ---- SIMD_WIDTH doubles, one per lane, as two halves ---- */
+/* ---- vectors of SIMD_WIDTH doubles, stored as two halves ---- */
 
 SIMD_INLINE void kernel_halves_widen(vf v, kernel_f64 out[2])
 {

@@ -51,8 +51,8 @@ void render_camera_ray(const render_camera *camera, int x, int y, double base[3]
     }
 }
 
-/* The pixel is divided into count × count squares. Sample k lies in column k, and each row has one sample; samples of
- * neighbouring columns lie in rows that are far apart. */
+/* The pixel is divided into count × count squares. Sample k lies at the middle of a square in column k, and each row of
+ * squares has one sample. Samples of neighbouring columns lie in rows that are far apart. */
 void render_camera_sample(int count, int k, double offset[2])
 {
     static const unsigned char few[4] = {1, 3, 0, 2};

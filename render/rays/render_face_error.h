@@ -1,5 +1,5 @@
-/* Defines the largest distance, along a ray, between two faces that coincide in exact arithmetic but not after
- * rounding. */
+/* Defines an upper bound of the distance, along a ray, between two faces that coincide in exact arithmetic but not
+ * after rounding. */
 #ifndef RENDER_FACE_ERROR_H
 #define RENDER_FACE_ERROR_H
 

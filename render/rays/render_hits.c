@@ -1,9 +1,9 @@
 /* The rays into the hemisphere above a hit pass through points on a spiral in the unit disk, spaced by equal areas and
- * projected upwards to the hemisphere (Malley's method). So their density is proportional to the cosine of the angle to
- * the normal, and the fraction of rays that no surface blocks is the hit's ambient light. Each pixel rotates the spiral
- * by an angle that differs from all its neighbours' (interleaved gradient noise, Jimenez 2014), and shifts its begin.
- * Both depend only on the pixel and on the frame's number among those that are averaged, so a surface that does not
- * move has the same samples at every step. */
+ * projected upwards to the hemisphere (Malley's method). So the density of rays is proportional to the cosine of the
+ * angle to the normal, and the fraction of rays that no surface blocks is the hit's ambient light. For each pixel, the
+ * spiral is rotated by an angle that differs from those of all neighbouring pixels (interleaved gradient noise, Jimenez
+ * 2014), and its samples are shifted along it. Angle and shift depend only on the pixel and on the frame's number among
+ * those that are averaged, so a surface that does not move has the same samples at every step. */
 #include "render_hits.h"
 
 #include <math.h>
@@ -67,9 +67,10 @@ static double fractional_part(double x)
 /* Cosine and sine of the golden angle, by which consecutive samples are rotated. */
 static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
-/* The pixel's spiral begins at a position within its first step, and is rotated by `turn`. The last directions are kept
- * away from the horizon, because for rays almost parallel to the surface a rounding error of its position becomes a
- * large error of the distance at which they meet it. */
+/* The circle through sample k encloses the share (k + begin) / count of the disk's area. `begin`, from 0 to 1, and the
+ * angle `turn`, by which the spiral is rotated, depend on the pixel. Samples are kept away from the disk's rim, which
+ * stands for rays parallel to the surface: for such rays, a small rounding error of the surface's position greatly
+ * changes the distance at which they meet the surface. */
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
 {
     const uint32_t width = (uint32_t)job->camera.width, column = pixel % width, row = pixel / width;

@@ -6,7 +6,7 @@
 #include "render.h"
 
 /* start: point at which a hit's rays begin, in scene units; view: unit vector to the eye; axes: orthonormal axes right,
- * up and forward, with the surface's normal as forward. All are along the world axes. */
+ * up and forward, with the surface's normal as forward. The components of all vectors are along the world axes. */
 typedef struct hit_frame {
     double start[3], view[3], axes[3][3];
 } hit_frame;
@@ -16,8 +16,8 @@ static inline double hit_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns the bounding box, in the scene's coordinates, of this rank's mesh parts on which a surface layer has a field.
- * Only layers for which is_wanted() returns true are considered. */
+/* Returns a bounding box in the scene's coordinates: that of this rank's mesh parts that have the field of a surface
+ * layer for which is_wanted() returns true. */
 render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer));
 
 /* Computes an orthonormal set of axes (right, up, forward) whose last one is the unit vector n. */
@@ -26,8 +26,8 @@ void hit_axes_around(const double n[3], double axes[3][3]);
 /* Unpacks the unit normal of an unlit fragment from its octahedral encoding. */
 void hit_normal(const float folded[2], double n[3]);
 
-/* Computes the hit_frame of a hit at depth t on the pixel's ray. normal: the encoded normal (hit_normal()); lift:
- * height above the surface, in scaled units, at which the hit's rays begin. */
+/* Computes the position, the view direction and the axes of a hit at depth t on the pixel's ray. normal: the encoded
+ * normal (hit_normal()); lift: height above the surface, in scaled units, at which the hit's rays begin. */
 hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
 
 /* Computes the unit directions of the rays for ambient occlusion of the pixel's hit (job->occlusion->samples of them),

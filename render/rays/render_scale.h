@@ -1,4 +1,4 @@
-/* Computes positions of values in the domain of a transfer function. */
+/* Maps values of a field to the domain in which a transfer function is evaluated (kernel_transfer). */
 #ifndef RENDER_RENDER_SCALE_H
 #define RENDER_RENDER_SCALE_H
 
