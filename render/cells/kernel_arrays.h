@@ -1,8 +1,8 @@
 /* Reads a mesh part's coordinates, values and connectivity for one cell per lane, from arrays of any layout and meshes
  * of one or several cell types. Arrays of float32 or float64 that are small enough are read by gather instructions,
- * others number by number. float32 numbers are compared with each other, and with an isovalue, in float32, others in
- * double; both give the same result. For all other computations numbers are converted to double. Meshes whose vertex or
- * cell indices do not fit in 32 bits cannot be read in lanes. */
+ * others number by number. float32 numbers are compared with each other, and with an isovalue, in float32; other
+ * numbers are compared in double. Both comparisons are exact. For all other computations numbers are converted to
+ * double. Meshes whose vertex or cell indices do not fit in 32 bits cannot be read in lanes. */
 #ifndef RENDER_KERNEL_ARRAYS_H
 #define RENDER_KERNEL_ARRAYS_H
 
@@ -17,11 +17,12 @@
 /* One coordinate of a mesh part's vertices, or one component of its field, as an array that is read by vertex or cell
  * index. */
 typedef struct kernel_numbers {
-    /* first number; NULL if the array cannot be gathered: it is too large, or neither float32 nor float64 */
+    /* address of the first number; NULL if gather instructions cannot read the array, because it is too large, or
+     * neither float32 nor float64 */
     const float *data;
     int32_t stride;   /* distance between consecutive numbers, in units of four bytes */
     bool is_wide;     /* set if the numbers are float64, not float32 */
-    grid_array array; /* the array itself, read one by one if data is NULL */
+    grid_array array; /* the array; its numbers are read one by one if data is NULL */
     /* if not NULL and `data` is NULL, numbers are read by grid_field_value() of this field instead of from `array` */
     const grid_field *field;
 } kernel_numbers;
@@ -42,8 +43,8 @@ typedef struct kernel_arrays {
     const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
-    /* the arrays whose entries are prefetched for a vertex: the three coordinates and the field (if the field is
-     * cell-centred, the first coordinate again) */
+    /* Address and stride in bytes of the four arrays whose entries are prefetched for a vertex: the three coordinates
+     * and the field. If the field is cell-centred, the first coordinate takes its place. */
     struct {
         const char *data;
         int64_t stride;
@@ -100,15 +101,16 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
     return p->type != GRID_NO_TYPE ? p->type : grid_cell_type(p->cells, cell);
 }
 
-/* Returns the index of the first connectivity entry of the cell; for a lattice, the index of the cell's first vertex.
- * vertices: number of vertices of each cell, used if the mesh has no offsets. */
+/* Returns the index, in the connectivity array, of the cell's first entry; for a structured grid (grid_lattice), which
+ * has no such array, the index of the cell's first vertex. vertices: number of vertices of each cell, used if the mesh
+ * has no offsets. */
 SIMD_INLINE int64_t kernel_arrays_first_entry(const grid *g, uint32_t cell, int vertices)
 {
     if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
 }
 
-/* Stores the vertex indices of a lattice's cell. Vertex i of the cell is stored in out[i * out_stride]. */
+/* Stores the vertex indices of a cell of a structured grid, that of the cell's vertex i in out[i * out_stride]. */
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out,
                                           int out_stride)
 {
@@ -160,8 +162,8 @@ SIMD_INLINE unsigned kernel_arrays_drawn_lanes(const kernel_arrays *p, const uin
 
 /* ---- coordinates and values ---- */
 
-/* Computes the coordinates along one axis of vertices of a uniform or rectilinear lattice, one vertex per lane. The
- * index along the axis is computed from the vertex index as in grid_index_along(). */
+/* Computes one coordinate of vertices of a uniform or rectilinear grid, one vertex per lane. The index along the axis
+ * is computed from the vertex index as in grid_index_along(). */
 static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_f64 out[2])
 {
     const grid_numbering *of = axis->vertices;
@@ -272,16 +274,16 @@ SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow,
     }
 }
 
-/* ---- cells of uniform and rectilinear lattices ---- */
+/* ---- cells of uniform and rectilinear grids ---- */
 
 SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 {
     return p->coordinates[0].array.axis != NULL;
 }
 
-/* Reads the coordinates of hexes of a uniform or rectilinear lattice, one per lane. first: index of each hex's first
- * vertex; cells: coordinates of that vertex (cells[0]) and of the opposite vertex of the hex (cells[1]), by axis and
- * half of the lanes. It reads 6 numbers per hex instead of 24. */
+/* Reads the coordinates of hexes of a uniform or rectilinear grid, one hex per lane. first: index of each hex's first
+ * vertex. cells[0] gets the coordinates of this vertex, cells[1] those of the vertex opposite to it in the hex, by axis
+ * and half of the lanes. These are 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
                                                                 kernel_f64 cells[2][3][2])
 {
@@ -297,11 +299,11 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
     }
 }
 
-/* ---- comparisons with a value ---- */
+/* ---- comparisons with an isovalue ---- */
 
-/* A number with which others are compared, or which is subtracted from them, for example an isovalue. value: the number
- * in double; middle + rest: the same number as the sum of two float32; least: the smallest float32 that is not below
- * it. */
+/* A number, for example an isovalue, that is compared with the numbers of an array or subtracted from them. value: this
+ * number in double; middle + rest: the same number as a sum of two float32; least: the smallest float32 that is not
+ * below it. */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;
@@ -326,14 +328,15 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
     return (kernel_level){value, middle, (float)(value - (double)middle), kernel_smallest_float_not_below(value)};
 }
 
-/* Returns the lanes in which the number v is below the level. The comparison is exact. */
+/* Returns the lanes in which the number v, which was read from the array c, is below `level`. The comparison is
+ * exact. */
 SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     const kernel_f64 half = (kernel_f64){0} + level->value, value[2] = {half, half};
     return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide, value);
 }
 
-/* Returns the number v minus the level, rounded to float32. */
+/* Returns the number v, which was read from the array c, minus `level`, rounded to float32. */
 SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     vf out;

@@ -1,6 +1,7 @@
-/* Computes bounds on the maps and fields of hexes, wedges or pyramids, one cell per lane. The bounds hold for all rays
- * of a tile; the header comment of kernel_roots.h defines the quantities that are bounded. A derivative that does not
- * depend on all three coordinates has the same value at several corners, and is computed once for these.
+/* Computes bounds of hexes, wedges or pyramids, one cell per lane: of the nonlinearity of the cell's map, which takes
+ * reference coordinates to positions, and of the field. The bounds hold for all rays of a tile; the header comment of
+ * kernel_roots.h defines the quantities that are bounded. A derivative that does not depend on all three coordinates
+ * has the same value at several corners, and is computed once for these corners.
  *
  * Let the position X and the field F, from which the isovalue has been subtracted, be functions of the reference
  * coordinates r. J is the Jacobian of X, and J0 its value at the cell's centre. N is the nonlinear part of J0^-1 X, so
@@ -26,33 +27,35 @@
 /* Bounds for one cell and isovalue per lane. */
 typedef struct kernel_bounds {
     /* Upper bound of the difference between the value at a computed crossing of a face and the field on the ray there.
-     * Negative: it has not been proved that the field is monotone along all rays in the cell. */
+     * A negative number means: it has not been proved that the field is monotone along all rays in the cell. */
     float jump[SIMD_WIDTH];
     /* The linear function L that approximates the field. level: its value at vertex 0; gradient: in tile space;
      * thickness: upper bound of |E| = |F - L| including rounding, infinite if nothing has been proved about the
      * cell. */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    /* normal: inverse of the map's Jacobian at the cell's centre. Each of its rows i is the normal of two planes
-     * between which the cell lies: low[i] <= normal[i] . (X - vertex 0) <= high[i]. */
+    /* normal: inverse of the map's Jacobian at the cell's centre. Row i of this matrix is the normal of two parallel
+     * planes between which the cell lies: low[i] <= normal[i] . (X - vertex 0) <= high[i]. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    /* coefficients 4 to 7 (of the products of coordinates, kernel_map.h) of the map's nonlinear part N */
+    /* for each component of the map's nonlinear part N, its coefficients 4 to 7: those of products of reference
+     * coordinates (kernel_map.h) */
     float nonlinear_part[3][4][SIMD_WIDTH];
     /* stretch: upper bound of the factor by which the inverse map stretches distances (L of kernel_roots.h); slope:
      * upper bound of the field's gradient (G of kernel_roots.h) */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
     /* Upper bounds of the second derivatives of the field (H of kernel_roots.h) and of the map's nonlinear part (K).
-     * For a pyramid they are bounds of these derivatives times its reference coordinate k. */
+     * For a pyramid they are upper bounds of these derivatives times the reference coordinate k, because the
+     * derivatives grow like 1 / k towards the apex. */
     float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
-    /* Coefficients from which surface/kernel_contraction.h computes a ray's crossing of the isovalue if it is the only
-     * one in the cell. J0^-1 (X - vertex 0) + offset equals r + N(r), where r is counted from the reference domain's
-     * middle (in a pyramid from the apex), and terms has the coefficients of N. The field is L + middle + a polynomial
-     * with the coefficients field_terms, in the same products of coordinates as N. */
+    /* Coefficients from which surface/kernel_contraction.h computes a ray's crossing of the isovalue in a cell in which
+     * the ray has no other crossing of it. J0^-1 (X - vertex 0) + offset equals r + N(r), where r is counted from the
+     * reference domain's middle (in a pyramid from the apex), and terms has the coefficients of N. The field is L +
+     * middle + a polynomial with the coefficients field_terms, in the same products of coordinates as N. */
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], terms[4][3][SIMD_WIDTH], field_terms[4][SIMD_WIDTH];
-    /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
-     * iteration is not a contraction */
+    /* K / (1 - K), where K < 1 is the contraction constant of the fixed-point iteration that computes the crossing
+     * (kernel_contraction.h); infinite if the iteration is not a contraction */
     float error_growth[SIMD_WIDTH];
-    /* In reference coordinates: error_bound is the error bound of the iteration's result, and domain_margin an upper
-     * bound of the distance by which rounding moves a root (kernel_contraction.h). */
+    /* Both in reference coordinates: error_bound is an upper bound of the rounding error of the iteration's result, and
+     * domain_margin an upper bound of the distance by which rounding moves a root (kernel_contraction.h). */
     float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
 } kernel_bounds;
 
@@ -75,17 +78,17 @@ typedef struct kernel_bounds_lanes {
      * of J0^-1 J - I; slant: of |grad E|; most_along: of |grad E . w|; most_turn: of |N' w|, where w = J0^-1 d is the
      * direction of the middle ray */
     kernel_f64 slope, theta, slant, most_along, most_turn;
-    kernel_f64 across; /* rounding error of positions across the rays */
-    /* gap: upper bound, in reference coordinates, of the distance between the computed crossing of a face and its ray;
+    kernel_f64 across; /* upper bound of the rounding error of positions, across the rays */
+    /* gap: upper bound, in reference coordinates, of the distance between a ray and its computed crossing of a face;
      * length: upper bound of |J0^-1 d| over the directions d of the tile's rays; rise: lower bound of |grad L . d| */
     kernel_f64 gap, length, rise;
-    kernel_f64_mask is_regular; /* cells that are solid, and whose theta is below 0.9 */
+    kernel_f64_mask is_regular; /* cells with is_solid whose theta is below 0.9 */
 } kernel_bounds_lanes;
 
-/* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
- * for points that rounding moves out of it. KERNEL_WIDE is the upper end of r and s in a wedge, which is extended twice
- * as far because the third side of the triangle is oblique. For a pyramid the coordinates are a / k, b / k and k
- * (kernel_map.h). */
+/* KERNEL_LOW and KERNEL_HIGH are the ends of the interval [0, 1] of a reference coordinate, extended by
+ * KERNEL_DOMAIN_RIM to both sides for points that rounding moves out of the cell. KERNEL_WIDE is the upper end of r and
+ * s in a wedge, which is extended twice as far because the third side of the triangle is oblique. For a pyramid the
+ * coordinates are a / k, b / k and k (kernel_map.h). */
 #define KERNEL_DOMAIN_RIM 0.03125
 #define KERNEL_LOW -KERNEL_DOMAIN_RIM
 #define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
@@ -103,10 +106,10 @@ static const double kernel_wedge_corners[6][3] = {
     {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH}, {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}};
 
 /* The extended reference domain of a cell type: its middle and its corners. Derivatives of a polynomial along axis a
- * are equal at some corners. slope_count[a]: number of different derivatives; first[a][n]: corner at which derivative n
- * is computed; at[a][c]: index of the derivative that corner c has. For a hex a derivative depends on the two other
- * coordinates. For a wedge it depends only on the last coordinate; along the last axis it depends on the two others.
- * For a pyramid it depends only on the coordinate along which it is taken. */
+ * are equal at some corners. slope_count[a]: number of different derivatives along axis a; first[a][n]: index of the
+ * corner at which the n-th of them is computed; at[a][c]: index n of the derivative that is valid at corner c. For a
+ * hex a derivative depends on the two other coordinates. For a wedge it depends only on the last coordinate; along the
+ * last axis it depends on the two others. For a pyramid it depends only on the coordinate along which it is taken. */
 typedef struct kernel_domain {
     double centre[3];
     const double (*corners)[3];
@@ -236,9 +239,9 @@ SIMD_INLINE void kernel_bounds_compute_nonlinear_map(kernel_bounds_lanes *b, int
     }
 }
 
-/* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
- * of the difference E = field - L. Returns the sum of the magnitudes of L's terms, to which the rounding error of L at
- * positions in the cell is proportional. */
+/* Computes the gradient, rounded to float32, of the linear function L that approximates the field, and the coefficients
+ * of the difference E = field - L. Returns a bound of the sum of the magnitudes of L's terms at positions in the cell;
+ * the rounding error of L is proportional to this sum. */
 SIMD_INLINE kernel_f64 kernel_bounds_fit_linear_function(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -257,7 +260,8 @@ SIMD_INLINE kernel_f64 kernel_bounds_fit_linear_function(kernel_bounds_lanes *b,
     return size;
 }
 
-/* Returns the maximum over the domain's corners of |E|, where e has the coefficients of E. */
+/* Returns the maximum of |E| over the corners of the reference domain, where E is the field minus its linear
+ * approximation. e: the polynomial coefficients of E. */
 SIMD_INLINE kernel_f64 kernel_f64_largest_error(int type, const kernel_f64 e[8])
 {
     const kernel_domain *table = kernel_domain_of(type);
@@ -320,7 +324,7 @@ SIMD_INLINE void kernel_bounds_maximize_over_corners(kernel_bounds_lanes *b, int
 {
     const kernel_domain *table = kernel_domain_of(type);
     const kernel_f64 zero = {0};
-    /* squares of the maxima; for theta an upper bound of the 8th power */
+    /* these variables hold squares of the maxima; only theta holds an upper bound of the 8th power */
     kernel_f64 theta = zero, slope = zero, most_along = zero, slant = zero, most_turn = zero;
     for (int n = 0; n < table->corner_count; n++) {
         kernel_f64 bend[3][3], df[3], de[3], along = zero, steep = zero, turn = zero;
@@ -351,9 +355,9 @@ SIMD_INLINE void kernel_bounds_maximize_over_corners(kernel_bounds_lanes *b, int
     b->most_turn = kernel_f64_sqrt(most_turn);
 }
 
-/* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices lie
- * (out->normal, low and high). The planes are moved outward by `pad`, an upper bound of the error of a ray's positions
- * in reference coordinates. */
+/* Computes two planes between which all vertices lie, and stores them in row i of out->normal, low and high. Row i of
+ * the inverse Jacobian at the centre is the normal of both planes. The planes are moved outward by `pad`, an upper
+ * bound of the error of a ray's positions in reference coordinates. */
 SIMD_INLINE void kernel_bounds_store_enclosing_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad,
                                                       int half, kernel_bounds *out)
 {
@@ -380,11 +384,11 @@ SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlin
     for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
 
-/* Computes error_growth = K / (1 - K), where K is the contraction's constant, and the bounds of rounding errors in
- * reference coordinates r. Let u = 6e-8, let e be the largest distance of a vertex from vertex 0 along an axis, and let
- * `wide` be the maximum of |x| and |y| over rays and vertices. y and w (the ray's point and direction in reference
- * coordinates), L and E (which sum to the field) are those of kernel_contraction.h. Three errors of r add up to
- * error_bound:
+/* Computes error_growth = K / (1 - K), where K is the contraction constant of the iteration of kernel_contraction.h,
+ * and the bounds of the rounding errors of reference coordinates r. Let u = 6e-8, let e be the largest distance of a
+ * vertex from vertex 0 along an axis, and let `wide` be the maximum of |x| and |y| over rays and vertices. y and w (the
+ * ray's point and direction in reference coordinates), L and E (which sum to the field) are those of
+ * kernel_contraction.h. Three errors of r add up to error_bound:
  *
  * y and w have errors of about 4 u |inverse| times `wide` across the ray, and times e along each axis. The rounding of
  * the inverse itself is included. For the first of these two errors the code uses an eighth of the 2e-6 that
@@ -455,9 +459,10 @@ SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int hal
     kernel_bounds_store_iteration_errors(b, type, half, out);
 }
 
-/* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
- * it is multiplied by k^2: for a b / k, with a / k and b / k in [-1/32, 33/32], the second derivatives are at most 1,
- * 33/32, 33/32 and 2.13 over k, so their norm is 3.29 / k. */
+/* Returns an upper bound, over the extended reference domain, of the squared Frobenius norm of a polynomial's Hessian.
+ * c: the polynomial's coefficients 4 to 7. For a pyramid the bound is one of this square times k^2: for a b / k, with a
+ * / k and b / k in [-1/32, 33/32], the second derivatives are at most 1, 33/32, 33/32 and 2.13 over k, so their norm is
+ * 3.29 / k. */
 SIMD_INLINE kernel_f64 kernel_f64_bound_squared_hessian(int type, const kernel_f64 c[4])
 {
     kernel_f64 sum = {0};
@@ -569,7 +574,7 @@ typedef struct kernel_curved {
     bool is_contracted;
 } kernel_curved;
 
-/* Returns bounds of the directions and origins of the tile's rays in tile space. */
+/* Returns upper bounds of the slopes and origins of the tile's rays in tile space. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;

@@ -45,9 +45,9 @@
  * orthographic. The edge function is then affine in u and v, because the products u v cancel:
  *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
  * Its coefficients are computed once per cell and tile, from the edge's two vertices in the order of coordinates, so
- * that they are bit-identical in all cells of the edge; a packet then needs two multiply-adds. For rays for which the
- * sign of that sum is uncertain, which depends on the edge and the ray alone, e is computed from the projected vertices
- * instead, by vf_diff_of_products(), with its exact sign.
+ * that they are bit-identical in all cells that have the edge; a packet then needs two multiply-adds. For rays for
+ * which the sign of that sum is uncertain, which depends on the edge and the ray alone, e is computed from the
+ * projected vertices instead, by vf_diff_of_products(), with its exact sign.
  *
  * The error bound below which the sign is uncertain (kernel_line.bound). Let r = 2^-24, W the maximum of |u| and |v|
  * over the tile, reach the eye's distance from the depth origin (0 if orthographic), M = |Z| + reach >= |D| (1 if
@@ -86,8 +86,8 @@ typedef struct kernel_tile_position {
     float x, y, z;
 } kernel_tile_position;
 
-/* Returns N as defined above kernel_line: twice an upper bound of |x| and |y| of a projected vertex over the tile's
- * rays. The error bounds of edge functions are computed from it. */
+/* Returns twice an upper bound of |x| and |y| of a vertex, projected along any of the tile's rays: N of the comment
+ * above kernel_line. The error bounds of edge functions are computed from this number. */
 SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile *tile, kernel_tile_position a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
@@ -109,12 +109,13 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_p
 
 /* ---- accuracy of weights ---- */
 
-/* Largest error of a crossing's depth, in t, that the rounding of weights may cause. The two crossings of a ray's
- * interval then use half of the 1e-6 that it may err by (tests/test_chords.c). */
+/* Largest error of a crossing's depth, in t, that the rounding of weights may cause. The length of a ray's interval may
+ * have an error of 1e-6 (tests/test_chords.c); the weights of its two crossings then cause at most half of this. */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* Properties of an edge from which the accuracy of weights is computed. error: largest error d of its edge function, as
- * derived above kernel_line. extent: its extent in depth plus a quarter of its extents across the ray. */
+/* Properties of an edge from which the accuracy of weights is computed. error: upper bound d of the error of its edge
+ * function, as derived above kernel_line. extent: the edge's extent in depth plus a quarter of its extents in x and
+ * y. */
 typedef struct kernel_edge_error {
     float error, extent;
 } kernel_edge_error;
@@ -127,22 +128,23 @@ SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radi
                                z + 0.25f * (x + y)};
 }
 
-/* Returns the least sum of a triangle's weights (A above kernel_line) at which its crossing errs by at most
- * KERNEL_WEIGHT_ERROR. errors, extents: sums over its three edges (kernel_edge_error). Along any axis the edges'
- * extents sum to twice the triangle's extent, hence the factor 1/2. */
+/* Returns the least sum of a triangle's weights at which the depth of its crossing has an error of at most
+ * KERNEL_WEIGHT_ERROR. The comment above kernel_line derives it, and calls the sum A. errors, extents: sums over the
+ * triangle's three edges (kernel_edge_error). Along any axis the edges' extents sum to twice the triangle's extent,
+ * hence the factor 1/2. */
 SIMD_INLINE float kernel_least_weight(float errors, float extents)
 {
     return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
 }
 
-/* Returns the maximum of two edges' errors and the maximum of their extents. */
+/* Returns the larger one of two edges' errors, and the larger one of their extents. */
 SIMD_INLINE kernel_edge_error kernel_edge_error_max(kernel_edge_error a, kernel_edge_error b)
 {
     return (kernel_edge_error){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
 }
 
-/* Returns an upper bound of kernel_least_weight() for all triangles whose edges have errors and extents of at most
- * `most`. */
+/* Returns an upper bound of kernel_least_weight() for all triangles whose edges have at most the error most.error and
+ * the extent most.extent. */
 SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 {
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
@@ -151,12 +153,13 @@ SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
 typedef struct kernel_cell {
-    uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
-    int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
-    bool is_finite;         /* set if the values at all vertices are finite */
-    bool is_transformed;    /* set if x, y and z are computed */
-    bool is_constant;       /* set if the values at all vertices are equal; computed for volumes only */
-    bool has_lines;         /* set if `lines` is computed */
+    uint32_t serial, index; /* number of the tile and index of the cell, by which the cell cache finds this struct */
+    /* index of the mesh part, and of the layer whose field the cell has; also used by the cell cache */
+    int part, layer;
+    bool is_finite;      /* set if the values at all vertices are finite */
+    bool is_transformed; /* set if x, y and z are computed */
+    bool is_constant;    /* set if the values at all vertices are equal; computed for volumes only */
+    bool has_lines;      /* set if `lines` is computed */
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -169,10 +172,10 @@ typedef struct kernel_cell {
     /* vertex values of the colour field, in its transfer function's domain; not set for tets */
     float g[GRID_MAX_CELL_VERTICES];
     int rank[GRID_MAX_CELL_VERTICES]; /* rank of each vertex in the lexicographic order of coordinates */
-    /* lines of the edges, then of the quads' diagonals; not computed for tets */
+    /* lines (kernel_line) of the edges, then of the quads' diagonals; not computed for tets */
     kernel_line lines[KERNEL_MAX_LINES];
-    /* upper bound, for all triangles, of the least sum of weights at which a crossing is accurate
-     * (kernel_least_weight()) */
+    /* if the sum of a crossing's weights is at least this, the crossing is accurate, whichever of the cell's triangles
+     * is crossed (kernel_least_weight_bound()) */
     float least;
 } kernel_cell;
 
@@ -209,8 +212,8 @@ static inline double kernel_cell_size(const double (*world)[3], int count)
     return volume > 0 ? cbrt(volume) : longest;
 }
 
-/* Adds a face's vertices to the list `vertices`, and returns them as a mask of their indices in this list. Returns 0 if
- * the list would exceed four vertices. */
+/* Adds those of a face's vertices that are missing to the list `vertices`. Returns a mask of the indices that the
+ * face's vertices have in this list. Returns 0 if the list would exceed four vertices. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
     int64_t first, end;
@@ -228,8 +231,8 @@ static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4],
 }
 
 /* Returns whether a polyhedron is a tet, and lists its vertices. Such a polyhedron is drawn bit for bit like a tet with
- * these vertices. A polyhedron is a tet if it has four vertices, and for each of them exactly one triangle that does
- * not contain this vertex. (Two triangles that each occur twice enclose no volume.) Faces that have collapsed to a
+ * these vertices. A polyhedron is a tet if it has four vertices, and if for each of them exactly one face is the
+ * triangle of the other three. (Two triangles that each occur twice enclose no volume.) Faces that have collapsed to a
  * point are ignored. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
@@ -267,12 +270,13 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 }
 
 /* Computes the canonical order of the vertices of a hex, wedge or pyramid. The first vertex is the one of least rank;
- * in a pyramid, the one of least rank in the base. The neighbours of the first vertex follow in the order of their
- * ranks, as far as the cell's shape allows. from[i] is the present index of the vertex that becomes vertex i. The order
- * may mirror the cell, because intersections do not depend on orientation. */
+ * in a pyramid, the one of least rank in the base. Its neighbours follow in the order of their ranks, as far as the
+ * cell's shape allows. from[i]: index, in the present order, of the vertex that becomes vertex i. The order may mirror
+ * the cell, because intersections do not depend on orientation. */
 SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
-    /* maps the index of a hex's vertex to the bits of its reference coordinates x, y, z, and back */
+    /* corner[i] is b, and corner[b] is i, if bits 0, 1 and 2 of b are the reference coordinates x, y and z, each 0 or
+     * 1, of the hex's vertex i */
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     const int begins = kernel_has_apex(c->type) ? 4 : c->count;
     int least = 0, swap;
@@ -321,7 +325,8 @@ SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count
         }
 }
 
-/* Permutes all members that are stored per vertex, except g, which is read later: vertex from[i] becomes vertex i. */
+/* Permutes the members that are stored per vertex: vertex from[i] becomes vertex i. The member rank is not permuted,
+ * nor is g, which is set later. */
 SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int count)
 {
     double world[GRID_MAX_CELL_VERTICES][3], values[GRID_MAX_CELL_VERTICES];
@@ -342,10 +347,10 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
     }
 }
 
-/* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
- * coordinates. In other cells, ranks are computed, and the vertices are permuted by kernel_cell_canonical_order(). So
- * no result depends on how the simulation numbers a cell's vertices, not even if the cell's map is folded, so that a
- * point has several reference coordinates. */
+/* Puts a cell's vertices in their canonical order. In a tet, whose vertices can be exchanged freely, this is the
+ * lexicographic order of coordinates. In other cells, ranks are computed, and the vertices are put in the order of
+ * kernel_cell_canonical_order(). So no result depends on how the simulation numbers a cell's vertices, not even if the
+ * cell's map is folded, so that a point has several reference coordinates. */
 static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
@@ -462,8 +467,8 @@ static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, co
         if (kernel_has_triangles(c->type))
             most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));
     }
-    /* A hex has triangles only if a quad has collapsed. The bound of infinity makes kernel_weights_recompute() always
-     * compute the triangle's own limit. */
+    /* A hex has triangles only if a quad has collapsed. For such a rare triangle, infinity makes
+     * kernel_weights_recompute() always compute the least sum of weights for the triangle itself. */
     c->least = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 

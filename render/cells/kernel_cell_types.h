@@ -1,6 +1,6 @@
 /* Properties of the cell types. Hexes, wedges and pyramids are called curved in the names of functions, because their
- * quadrilateral faces may be warped. No other file of render/ compares types: other files use the properties defined
- * here, and tables that are indexed by kernel_shape_number() (kernel_shapes.h). */
+ * quadrilateral faces may be warped. No other file of render/ compares cell types: other files call the functions
+ * below, and use tables that are indexed by kernel_shape_number() (kernel_shapes.h). */
 #ifndef RENDER_KERNEL_CELL_TYPES_H
 #define RENDER_KERNEL_CELL_TYPES_H
 
@@ -26,7 +26,7 @@ static inline bool kernel_has_apex(int type)
     return type == GRID_PYRAMID;
 }
 
-/* The types with quadrilateral faces, in the order of all tables of such types. */
+/* The types with quadrilateral faces, in the order in which all tables of these types have them. */
 enum { KERNEL_CURVED_TYPES = 3 };
 static const int kernel_curved_types[KERNEL_CURVED_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
 
@@ -35,7 +35,7 @@ static const int kernel_curved_types[KERNEL_CURVED_TYPES] = {GRID_HEX, GRID_WEDG
 enum { KERNEL_LANE_TYPES = KERNEL_CURVED_TYPES + 1 };
 static const int kernel_lane_types[KERNEL_LANE_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
 
-/* Indices in kernel_curved_types, as constants. */
+/* Indices of hexes, wedges and pyramids in kernel_curved_types. */
 enum { KERNEL_SHAPE_HEX, KERNEL_SHAPE_WEDGE, KERNEL_SHAPE_PYRAMID };
 
 /* Returns the index in kernel_curved_types of a type with quadrilateral faces. */

@@ -1,5 +1,5 @@
-/* Converts a cell's vertex values to the forms that layers need: minus an isovalue, or in the domain of a transfer
- * function. */
+/* Converts a cell's vertex values to the form that a layer needs: for an isosurface, the values minus the isovalue; for
+ * a volume, the values in the domain of its transfer function. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -12,7 +12,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Returns whether some values are below the isovalue and some are not. */
+/* Returns whether at least one value is below the isovalue and at least one is not. */
 SIMD_INLINE bool kernel_values_straddle(const double *values, int count, double isovalue)
 {
     bool below = false, above = false;
@@ -23,8 +23,8 @@ SIMD_INLINE bool kernel_values_straddle(const double *values, int count, double 
     return below && above;
 }
 
-/* Returns a power of two by which `largest` (>= 0) is multiplied to bring it near 1. Its exponent is the negated
- * exponent of `largest`, limited so that the result is a normal number. */
+/* Returns a power of two by which `largest` (>= 0) is multiplied to bring it near 1. The exponent of the result is
+ * minus that of `largest`, limited so that the result is a normal number. */
 SIMD_INLINE double kernel_mirrored_power(double largest)
 {
     uint64_t bits;

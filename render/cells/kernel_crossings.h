@@ -1,6 +1,6 @@
-/* Computes the crossings of a packet's rays with the faces of one cell. First edge functions are computed on the rays
- * from the cell's lines (kernel_cell.h defines these terms), then the crossings of hexes, wedges and pyramids.
- * kernel_tets.h computes those of tets. */
+/* Computes the crossings of a packet's rays with the faces of one cell. The first functions compute the rays' edge
+ * functions from the lines of the cell's edges (kernel_cell.h defines these terms). The others compute from these the
+ * crossings with hexes, wedges and pyramids. kernel_tets.h computes those with tets. */
 #ifndef RENDER_KERNEL_CROSSINGS_H
 #define RENDER_KERNEL_CROSSINGS_H
 
@@ -30,10 +30,10 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_tile_position a)
     return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
 }
 
-/* Decides the sign of the edge function on rays on which it is almost zero. The sign is computed in double, where
- * products of float32 are exact. The magnitude of such a function is negligible next to those of other edges. It is set
- * to KERNEL_EDGE_LEAST, because the weights of a triangle must not all be zero. If the function is exactly zero, the
- * tie is decided by the rule of kernel_cell.h, and stored as the sign of the zero. */
+/* Decides the sign of the edge function on rays on which the function is almost zero. The sign is computed in double,
+ * in which products of float32 are exact. The magnitude of such an edge function is negligible compared with those of
+ * other edges. It is set to KERNEL_EDGE_LEAST, because the weights of a triangle must not all be zero. If the function
+ * is exactly zero, the tie is decided by the rule of kernel_cell.h, and stored as the sign of the zero. */
 static __attribute__((noinline, cold)) vf kernel_decide_edge_ties(vf ax, vf ay, vf bx, vf by, vf e)
 {
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -48,10 +48,10 @@ static __attribute__((noinline, cold)) vf kernel_decide_edge_ties(vf ax, vf ay, 
     return e;
 }
 
-/* Returns v_out, changed for some rays. v_in, v_out: values minus the isovalue where the ray enters and leaves a cell.
- * If the surface consists of faces of cells (is_of_faces of render.h) and a ray meets such a face only in an edge, v_in
- * and v_out are both 0. For such a ray a number slightly below 0, as inside the cell, is returned, so that the ray has
- * a crossing. */
+/* Returns v_out, except for rays that meet a surface only in an edge of its faces. v_in, v_out: values minus the
+ * isovalue where the ray enters and leaves a cell. If the surface consists of faces of cells (is_of_faces of render.h)
+ * and a ray meets such a face only in an edge, v_in and v_out are both 0. For such a ray, a number slightly below 0 is
+ * returned, as inside the cell, so that the ray crosses the surface. */
 SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
 {
     if (!is_of_faces) return v_out;
@@ -86,7 +86,8 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
 }
 
 /* Returns the edge function of the edge from a to b on the packet's rays, with exact signs and ties decided: the sign
- * bit states the side, even of a zero. a must be before b in the order of coordinates; l: the edge's line. */
+ * bit states the side, even of a zero. a must be before b in the order of coordinates; l: the edge's line
+ * (kernel_line). */
 SIMD_INLINE vf kernel_edge_function_on_rays(const kernel_packet *p, const kernel_line *l, kernel_tile_position a,
                                             kernel_tile_position b)
 {
@@ -96,7 +97,8 @@ SIMD_INLINE vf kernel_edge_function_on_rays(const kernel_packet *p, const kernel
     return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_recomputed(p, a, b, doubt, e) : e;
 }
 
-/* Returns those of the given rays that cross the triangle i, j, k. ij, jk, ik: its edge functions on the rays. */
+/* Returns those of the given rays that cross the triangle with the vertices i, j, k. ij, jk, ik: the rays' edge
+ * functions of the triangle's edges. */
 SIMD_INLINE vm kernel_rays_inside_triangle(vm rays, vf ij, vf jk, vf ik)
 {
     const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
@@ -135,8 +137,8 @@ static __attribute__((noinline, cold)) float kernel_compute_triangle_least_weigh
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
-/* Returns those of the rays that cross a triangle (hit) whose sum of weights is smaller than `least`, so that their
- * crossing is not accurate enough. */
+/* Returns the rays whose crossing of a triangle is not accurate enough, because the sum of its weights (`weight`) has a
+ * magnitude below `least`. hit: the rays that cross the triangle. */
 SIMD_INLINE vm kernel_is_inaccurate(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
@@ -202,7 +204,7 @@ SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
     return kernel_weighted_sum(w, z[w->i], z[w->j], z[w->k]);
 }
 
-/* The data that all faces of a cell share in a search for crossings. */
+/* The rays and the cell of a search for crossings, with the data that are computed once for all of the cell's faces. */
 typedef struct kernel_face_search {
     const kernel_packet *packet;
     const kernel_cell *cell;
@@ -214,8 +216,8 @@ typedef struct kernel_face_search {
     vf edge[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_face_search;
 
-/* Computes the edge function from cell->lines[n], the line that connects the vertices i and j. These may be given in
- * any order. */
+/* Computes the rays' edge function of the edge between the vertices i and j, and stores it in s->edge. n: index of the
+ * edge in cell->lines. i and j may be given in any order. */
 SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
 {
     const kernel_cell *c = s->cell;
@@ -233,8 +235,8 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
         out->r[a] = kernel_weighted_sum(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
-/* Returns the edge function of the edge from one vertex to another. It is computed in the order of coordinates and
- * negated if necessary. */
+/* Returns the edge function of the edge from one vertex to another. The function is stored for the direction in which
+ * coordinates increase, and is negated for the other direction. */
 SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 {
     return s->cell->rank[from] < s->cell->rank[to] ? s->edge[from][to] : -s->edge[to][from];
@@ -279,8 +281,8 @@ SIMD_INLINE vm kernel_rays_crossing_triangle(const kernel_face_search *s, const 
                                        s->edge[ijk[0]][ijk[2]]);
 }
 
-/* Computes the crossings of rays with the triangle of three of the cell's vertices. Returns false if no ray crosses
- * it. */
+/* Computes the crossings of rays with a triangle. corners: indices of its vertices in the cell. Returns false if no ray
+ * crosses the triangle. */
 SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_point *out)
 {
     const kernel_cell *c = s->cell;
@@ -298,8 +300,8 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     return true;
 }
 
-/* Computes the crossings of a quad that has collapsed to a triangle, as those of its two halves. Returns how many
- * entries of `out` are set. */
+/* Computes the crossings of a quad that has collapsed to a triangle, as crossings of the two triangles into which its
+ * diagonal splits it. Returns how many entries of `out` are set. */
 static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
                                                                       kernel_point *out)
 {
@@ -374,8 +376,8 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
     return n;
 }
 
-/* Removes the nearest crossing of each ray from the list and returns it in *out. Returns false if no ray has a crossing
- * left. */
+/* Removes the nearest crossing of each ray from the list and stores it in *out. Returns false if the list has no
+ * crossing of any ray. */
 SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point *out)
 {
     vi taken = vi_set(-1);
@@ -405,9 +407,9 @@ SIMD_INLINE void kernel_interval_from_points(vm mask, const kernel_point *in, co
     memcpy(i->r_out, out->r, sizeof out->r);
 }
 
-/* Computes the intervals of rays inside a hex, wedge or pyramid: each ray's crossings are sorted by depth, and each two
- * of them are the ends of an interval. Returns how many entries of `out` are set; entry n has the n-th interval of each
- * ray. */
+/* Computes the intervals of rays inside a hex, wedge or pyramid: each ray's crossings are sorted by depth; the first
+ * and the second are the ends of an interval, then the third and the fourth, and so on. Returns how many entries of
+ * `out` are set; entry n has the n-th interval of each ray. */
 static __attribute__((noinline, unused)) int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c,
                                                                      vm rays,
                                                                      kernel_interval out[KERNEL_MAX_CELL_INTERVALS])

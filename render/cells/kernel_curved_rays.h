@@ -1,6 +1,6 @@
 /* Intersects rays with hexes, wedges or pyramids, each ray with a cell of its own: finds the two faces of its cell that
  * each ray crosses, and the crossings. Lanes are rays; each lane gathers its cell's numbers from vectors whose lanes
- * are cells. A ray for which this is not enough, because it may cross more than two faces, one face twice, or an edge,
+ * are cells. A ray that may cross more than two faces, one face twice, or an edge cannot be processed in this way; it
  * is added to the mask *alone. Callers trace such rays cell by cell, by kernel_crossings.h. Used by
  * kernel_curved_batch.h, kernel_occlusion_hexes.h and kernel_local_segments.h. */
 #ifndef RENDER_KERNEL_CURVED_RAYS_H
@@ -28,7 +28,8 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
 /* ---- faces that each ray crosses ---- */
 
 /* Returns the edge function of the edge from vertex a to vertex b as an integer vector, of which only the exact sign
- * bits are used. x, y: the projected vertices. Lowers *least to the function's magnitude if that is smaller. */
+ * bits are used. x, y: the projected vertices. If the function's magnitude is smaller than *least, *least is set to
+ * it. */
 SIMD_INLINE vi kernel_curved_edge_sign(const vf x[8], const vf y[8], int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
@@ -36,10 +37,11 @@ SIMD_INLINE vi kernel_curved_edge_sign(const vf x[8], const vf y[8], int a, int 
     return vi_from_bits(e);
 }
 
-/* Returns the rays that cross exactly one of a quad's two triangles. Unlike a test of the four edges, this is right
- * even if the quad is not convex in the projection along the ray. The result does not depend on the diagonal along
- * which the quad is split. around: edge functions of the quad's edges in cyclic order; diagonal: that from corner 0 to
- * corner 2; of both only the sign bits are used. Rays that may cross the quad's patch twice are added to *alone. */
+/* Returns the rays that cross exactly one of a quad's two triangles. Unlike a test of the signs of the four edge
+ * functions, this test is right even if the quad is not convex in the projection along the ray. The result does not
+ * depend on the diagonal along which the quad is split. around: edge functions of the quad's edges in cyclic order;
+ * diagonal: that from corner 0 to corner 2; of both only the sign bits are used. Rays that may cross the quad's patch
+ * twice are added to *alone. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], const signed char *loop,
                                                 const vi around[4], vi diagonal, vm rays, vm *alone)
 {
@@ -101,9 +103,9 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
 
 /* ---- crossing points ---- */
 
-/* The corners of one face of each ray's cell, in the order of kernel_transformed_curved.corners. vertex: its index in
- * the cell; at[i]: x, y (relative to the ray once they are projected), depth, and field of corner i. The fourth corner
- * of a triangle is meaningless. */
+/* The corners of one face of each ray's cell, in the order of kernel_transformed_curved.corners. vertex[i]: index of
+ * corner i in the cell; at[i]: x, y, depth and field of corner i, where x and y are relative to the ray after
+ * kernel_curved_corners_project(). A triangle has only three corners; its fourth entry is meaningless. */
 typedef struct kernel_curved_corners {
     vi vertex[4];
     vf at[4][4];
@@ -179,7 +181,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
 }
 
 /* Computes the edge functions ij, jk and ik of a triangular face of each ray's cell, for the given rays, from the lines
- * of the cells. face: index of the face in the cell. Other lanes get meaningless numbers. */
+ * that h holds (kernel_transformed_curved.triangles). face: index of the face in the cell. Lanes of other rays get
+ * meaningless numbers. */
 SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                               vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
@@ -197,8 +200,8 @@ SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h
     if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p->lane, rays, number, doubt, c, e);
 }
 
-/* Computes the crossings of triangles: depth, field and reference coordinates, as means of those of the corners,
- * weighted by the edge functions e (ij, jk, ik). */
+/* Computes the crossings of triangles. Depth, field and reference coordinates of a crossing are means of those at the
+ * corners, with weights from the edge functions e (ij, jk, ik). */
 SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corners *c, const vf e[3],
                                               kernel_point *out)
 {
@@ -216,8 +219,8 @@ SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corn
 }
 
 /* Computes the two crossings of each active ray, the nearer one first. face: indices of the two crossed faces in the
- * cell; corners: their projected corners. h: the cells, whose lines are used for triangles; NULL: edge functions are
- * computed from the corners. */
+ * cell; corners: their projected corners. h: the cells, from whose lines the edge functions of triangles are computed;
+ * if it is NULL, they are computed from the corners. */
 SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h, const kernel_lane_rays *p, vm active,
                                              int type, const vi face[2], const kernel_curved_corners corners[2],
                                              kernel_point out[2])
@@ -266,9 +269,10 @@ SIMD_INLINE void kernel_curved_compute_crossings(const kernel_transformed_curved
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
-/* The list `met` has rays that cross their cells. Of its entries n to n + SIMD_WIDTH - 1, those whose bit is set in
- * `bits` are appended to the list `rays`. ends: `end_count` crossings of each of these entries, one entry per lane; the
- * depth, value and reference coordinates of the crossings are appended to `out`. */
+/* Appends rays of the list `met` to the list `rays`: those of its entries n to n + SIMD_WIDTH - 1 whose bit is set in
+ * `bits`. ends[e]: crossing e of these SIMD_WIDTH rays with their cells, one ray per lane, for e < end_count. Depth,
+ * value and reference coordinates of an appended ray's crossing e are stored in out[e][0] to out[e][4], at the ray's
+ * index in `rays`. */
 SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
                                         unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {
@@ -287,7 +291,7 @@ SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, con
     }
 }
 
-/* Loads the crossings of SIMD_WIDTH rays, from index n on, that kernel_curved_ends_add() has stored. */
+/* Loads the crossings, stored by kernel_curved_ends_add(), of the SIMD_WIDTH rays from index n on in the list. */
 SIMD_INLINE void kernel_curved_ends_load(float (*const ends)[5][KERNEL_LIST_ROOM], int n, int end_count,
                                          kernel_point *out)
 {

@@ -1,7 +1,7 @@
 /* Operations on one vertex or one edge per lane, each lane with a cell of its own: positions in tile space, values
  * relative to an isovalue, and edge functions (kernel_cell.h). Computations in double are done for one half of the
- * lanes (kernel_wide.h) after the other. The operations and their order are those for a single cell, so the results are
- * bit-identical. */
+ * lanes (kernel_wide.h) after the other. The operations and their order are those of the functions for a single cell,
+ * so the results are bit-identical to theirs. */
 #ifndef RENDER_KERNEL_LANES_CELL_H
 #define RENDER_KERNEL_LANES_CELL_H
 
@@ -72,7 +72,8 @@ SIMD_INLINE void kernel_lanes_subtract_isovalues(const kernel_f64 (*values)[2], 
             v[i] = values[i][half] - isovalue;
             largest = kernel_f64_max(kernel_f64_abs(v[i]), largest);
         }
-        /* exponent of the largest value, limited so that its negation is the exponent of a normal number */
+        /* exponent of the largest magnitude in each lane, limited so that a number with the negated exponent is a
+         * normal number */
         kernel_f64_mask exponent = (kernel_f64_mask)largest >> 52;
         const kernel_f64_mask low = exponent < 23;
         const kernel_f64_mask high = exponent > 2023;
@@ -82,8 +83,8 @@ SIMD_INLINE void kernel_lanes_subtract_isovalues(const kernel_f64 (*values)[2], 
     }
 }
 
-/* Returns N of kernel_cell.h for one vertex per lane: twice an upper bound of |x| and |y| of the projected vertex over
- * the tile's rays. */
+/* Returns, for one vertex per lane, twice an upper bound of |x| and |y| of the vertex, projected along any of the
+ * tile's rays (N of kernel_cell.h). */
 SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
 {
     vf depth = vf_set(1);

@@ -29,8 +29,8 @@
 
 enum { KERNEL_NONLINEAR_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
-/* Limits of the square of the norm of n's derivative, for norms of 0.78 and 0.89. The second is for callers that bound
- * the error of the reference coordinates themselves. */
+/* Limits of the squared Frobenius norm of the derivative of n, the nonlinear part of a cell's map: 0.78 squared and
+ * 0.89 squared. The second limit is for callers that compute their own bound of the error of reference coordinates. */
 #define KERNEL_LOCAL_BENT 0.6f
 #define KERNEL_LOCAL_BENT_MOST 0.8f
 
@@ -43,10 +43,10 @@ typedef struct kernel_local_cells {
     float field[4 + KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* bounds of y, the affine approximation of the reference coordinates, over all points inside the cell */
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    /* square of an upper bound of the Frobenius norm of n's derivative */
+    /* upper bound of the squared Frobenius norm of the derivative of n, the map's nonlinear part */
     float bend[SIMD_WIDTH];
-    /* error bound of the reference coordinates: a point whose r is closer than this to the border of the reference
-     * domain may be inside or outside the cell */
+    /* upper bound of the error of computed reference coordinates r; if r is closer than this to the border of the
+     * reference domain, the point may be inside or outside the cell */
     float error_bound[SIMD_WIDTH];
 } kernel_local_cells;
 
@@ -134,7 +134,8 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], vf term[KERN
     }
 }
 
-/* Converts reference coordinates r of kernel_map.h, which are counted from a corner, to those of this file. */
+/* Converts reference coordinates r from those of kernel_map.h, which are counted from a corner, to those of this file,
+ * which are counted from the middle. */
 SIMD_INLINE void kernel_local_of_reference(int type, vf r[3])
 {
     vf middle = vf_set(kernel_is_box(type) ? 0.5f : 1.0f / 3);
@@ -158,7 +159,8 @@ SIMD_INLINE vf kernel_local_border_distance(int type, const vf r[3])
 
 /* ---- maps of cells ---- */
 
-/* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
+/* Returns an upper bound, over the cell, of the squared Frobenius norm of the derivative of n, the nonlinear part of
+ * the cell's map. For hexes and wedges it is the maximum at the corners. */
 SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
@@ -211,9 +213,9 @@ SIMD_INLINE vf kernel_local_invert(const vf m[3][8], vf inverse[3][3])
     return det;
 }
 
-/* Computes the bounds `low` and `high` of the affine function y: its range over all vertices, widened by the error
- * bound. They hold in the whole cell, because each of its points is a mean of the vertices with non-negative weights.
- * at: positions of the vertices relative to vertex 0. */
+/* Computes the bounds `low` and `high` of y, the affine approximation of the reference coordinates: the range of y over
+ * all vertices, widened by the error bound. The bounds hold in the whole cell, because each point of the cell is a mean
+ * of the vertices with non-negative weights. at: positions of the vertices relative to vertex 0. */
 SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                             kernel_local_cells *out)
 {
@@ -231,9 +233,9 @@ SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const 
 }
 
 /* Computes an upper bound of the error of the reference coordinates r (kernel_local_cells.error_bound). Four errors add
- * up: crossings of faces (kernel_quad.h) err by 3e-7 of the cell's size, and by half a unit in the last place of their
- * depth; positions of vertices across the ray err by a few units in the last place; Newton's method leaves an error of
- * 2e-6 in r; and positions from which r is computed err by a few units in the last place. */
+ * up: crossings of faces (kernel_quad.h) have errors of 3e-7 of the cell's size, and of half a unit in the last place
+ * of their depth; x and y of vertices have errors of a few units in the last place; Newton's method leaves an error of
+ * 2e-6 in r; and positions from which r is computed have errors of a few units in the last place. */
 SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], const vf inverse[3][3],
                                           kernel_local_cells *out)
 {
@@ -250,8 +252,8 @@ SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], cons
 }
 
 /* Computes the maps of one cell of this type per lane. places: vertices in tile space; values: the field at them.
- * Returns the lanes whose map can be inverted: those with `bend` below most_bent and a small error bound. The data of
- * other lanes must not be used. */
+ * Returns the lanes whose map can be inverted: those with `bend` (kernel_local_cells) below most_bent and with an error
+ * bound below 0.05. The data of other lanes must not be used. */
 SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const vf values[8], float most_bent,
                                          kernel_local_cells *out)
 {
@@ -286,14 +288,13 @@ SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const 
 /* ---- reference coordinates of points ---- */
 
 /* Points, one per lane, each in its own cell. y: affine approximation of the point's reference coordinates r;
- * nonlinear_part: the coefficients of the cell's n. */
+ * nonlinear_part: the coefficients of n, the nonlinear part of the cell's map. */
 typedef struct kernel_local_points {
     vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     /* The nonlinear terms of the map (products of the reference coordinates) at the current r, and their
      * derivatives. */
     vf term[KERNEL_NONLINEAR_TERMS], slopes[KERNEL_NONLINEAR_TERMS][3];
-    /* column: columns of the adjugate of the matrix of derivatives of r + n(r); det: the reciprocal of this matrix's
-     * determinant */
+    /* column: columns of the adjugate of the Jacobian of r + n(r); det: 1 divided by the Jacobian's determinant */
     vf column[3][3], det;
 } kernel_local_points;
 

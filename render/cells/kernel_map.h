@@ -1,7 +1,7 @@
 /* Inverts the maps of hexes, wedges and pyramids: computes the reference coordinates of a point, and so the field and
  * its gradient there.
  *
- * All three maps are one polynomial in the reference coordinates (r, s, q),
+ * The maps of all three types are the same polynomial in the reference coordinates (r, s, q),
  *     c0 + c1 r + c2 s + c3 q + c4 m + c5 r q + c6 s q + c7 m q,
  * with m = r s. The trilinear hex has all terms; in the wedge c4 and c7 are 0. The pyramid is the collapsed hex, whose
  * map is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 +
@@ -23,9 +23,9 @@
 
 enum { KERNEL_MAP_STEPS = 10 };
 
-/* Newton's method ends after a step that is smaller than this in reference coordinates. The remaining error is the
- * square of the step times the map's curvature; except in extremely warped cells, this is below float32's
- * resolution. */
+/* Newton's method ends after a step that is smaller than this in reference coordinates. The remaining error is about
+ * the square of this step times the second derivative of the map; except in extremely warped cells, this is below
+ * float32's resolution. */
 #define KERNEL_MAP_TOLERANCE 5e-5f
 
 /* Computes the polynomial coefficients c of a hex's coordinate or field from its values v at the vertices. c and v are
@@ -95,7 +95,8 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
 {
     kernel_product out = {r[0] * r[1], r[1], r[0], vf_set(0)};
     if (is_pyramid) {
-        /* Within the cell a / k and b / k are in [0, 1]; the clamp limits steps beyond the apex. */
+        /* Within the cell a / k and b / k are in [0, 1]; the clamp limits them for points beyond the apex, which
+         * Newton's method may try. */
         const vf inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         out.ds = vf_clamp(r[0] * inverse, vf_set(-1), vf_set(2));
         out.dr = vf_clamp(r[1] * inverse, vf_set(-1), vf_set(2));
@@ -159,8 +160,8 @@ typedef struct kernel_map {
     kernel_f64 exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
 } kernel_map;
 
-/* Computes the map of each ray's own cell. at: x, y, z and the field, by vertex, in arrays whose lanes are cells; lane:
- * the lane of each ray's cell in these arrays. */
+/* Computes the map of each ray's own cell. at[n][vertex][lane]: x, y, z (n = 0, 1, 2) and field (n = 3) of the cell in
+ * this lane; lane: the lane of each ray's cell in these arrays. */
 SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map *out, int type)
 {
     const int count = grid_type_vertices(type);
@@ -323,23 +324,23 @@ SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
 }
 
-/* Returns the field at depth t, interpolated linearly between the interval's ends. */
+/* Returns the field at depth t, interpolated linearly between its values at the interval's ends. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
     return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);
 }
 
-/* Interpolates the reference coordinates at depth t linearly between the interval's ends. Inside a warped cell they are
- * only a guess. */
+/* Interpolates the reference coordinates at depth t linearly between those at the interval's ends. Inside a warped cell
+ * the result is only a guess. */
 SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[3])
 {
     const vf along = kernel_interval_fraction(i, t);
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
-/* Returns the field at depth t on the rays in `wanted`, and replaces the guess in r by the reference coordinates. For
- * rays for which the map cannot be inverted, both are interpolated linearly between the interval's ends, and *failures
- * is increased by the number of these rays. */
+/* Returns the field at depth t on the rays in `wanted`, and replaces the guess in r by the reference coordinates there.
+ * For rays for which the map cannot be inverted, field and reference coordinates are interpolated linearly between the
+ * interval's ends, and *failures is increased by the number of these rays. */
 SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map, const kernel_interval *i, vm wanted,
                                   vf t, vf r[3], int64_t *failures)
 {
@@ -376,7 +377,7 @@ SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, k
     memcpy(out->r, i->r_out, sizeof out->r);
 }
 
-/* Interpolates the reference coordinates between two points of each ray, at depth t. */
+/* Interpolates the reference coordinates at depth t linearly between those of two points of each ray. */
 SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
 {
     const vf length = high->t - low->t;
@@ -388,7 +389,7 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
  * the same point, if the largest magnitude of a vertex value is near 1. */
 #define KERNEL_FACE_BAND 1e-6f
 
-/* Bounds of rays in tile space. spread: their directions are (x, y, 1) with |x| and |y| up to this. */
+/* Upper bounds for a set of rays in tile space. spread: of |x| and |y|, where (x, y, 1) is a ray's direction. */
 typedef struct kernel_beam {
     float spread;
     float offset; /* largest |origin_x| and |origin_y| of the rays */
