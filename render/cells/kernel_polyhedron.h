@@ -1,13 +1,14 @@
 /* Intersects rays with a polyhedron (render_polyhedra.h): computes its intervals inside, and the field along them.
  *
- * The polyhedron's surface consists of triangles, called facets. It is intersected as for other cells (kernel_cell.h):
- * edge functions are computed once per edge, and from them the crossings of triangles. The sorted crossings form pairs,
- * between which the ray is inside. The number of intervals is not limited.
+ * The polyhedron's surface consists of triangles, called facets. Rays are intersected with them as with the faces of
+ * other cells (kernel_cell.h): edge functions are computed once per edge, and from these the crossings of triangles.
+ * The sorted crossings form pairs, between which the ray is inside. The number of intervals is not limited.
  *
  * The cell is divided into tets, each of which connects a surface triangle to the centre, the mean of the vertices. The
  * field is linear in each tet. Neighbouring tets share a triangle that connects an edge to the centre, called a sheet.
- * Along the ray the field is continuous and piecewise linear, and its slope changes only at sheets. So a profile
- * consists of the interval's ends and the crossed sheets between them, sorted by depth:
+ * Along the ray the field is continuous and piecewise linear, and its slope changes only at sheets. So the field in an
+ * interval is given by its values at the interval's ends and at the crossed sheets between them, sorted by depth.
+ * Functions call this piecewise linear function of t a profile:
  *
  *      v |        .sheet
  *        |      .'      '.        .exit
@@ -16,11 +17,12 @@
  *        +---t_in--------------------t_out---> t
  *
  * If the cell is star-shaped from its centre, the tets fill it exactly once, and the field at a sheet is the sheet's
- * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum over the tets
- * that contain it, each with its sign. (A point inside the cell is contained in one more positive than negative tet. If
- * the two tets of a sheet are on different sides of it, the ray leaves one and enters the other, and the sum does not
- * jump. If both are on one side, they have opposite signs, and the ray enters or leaves both: the sum changes by f - f
- * = 0.) That sum is computed at sheets, from each tet's interval [t_in, t_out).
+ * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum of the fields of
+ * all tets that contain the point, each multiplied by the tet's sign (render_polyhedra.h). (A point inside the cell is
+ * contained in one more positive than negative tet. If the two tets of a sheet are on different sides of it, the ray
+ * leaves one and enters the other, and the sum does not jump. If both are on one side, they have opposite signs, and
+ * the ray enters or leaves both: the sum changes by f - f = 0.) The sum is computed at the crossings of sheets; a tet
+ * contains such a point if its t is in the ray's interval [t_in, t_out) inside the tet.
  *
  * On which side of an isovalue a ray enters and leaves is decided by the values on the faces themselves
  * (kernel_surface.h). These are linear on triangles, bilinear on quads, as in a hex on the other side, and linear on
@@ -39,10 +41,11 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Crossings of rays with a triangle. t: depth; v: value; w: value of the colour field; all are linear on the triangle.
- * If the triangle is on the polyhedron's surface, t_face, v_face and w_face are the same quantities on the face of
- * which it is a part; if this face is a quad, its surface is a bilinear patch. If the triangle is a sheet, v_face and
- * w_face are the fields of the cell at the crossing. */
+/* Crossings of rays with a triangle of a polyhedron. t: depth; v: value of the field; w: value of the colour field; all
+ * three are interpolated linearly on the triangle. If the triangle is on the polyhedron's surface, t_face, v_face and
+ * w_face are the same quantities on the face of which it is a part; if this face is a quad, its surface is a bilinear
+ * patch. If the triangle is a sheet (between an edge and the centre), v_face and w_face are the values of the cell's
+ * field and colour field at the crossing. */
 typedef struct kernel_triangle_crossings {
     vm mask;
     vf t, v, w;
@@ -56,8 +59,8 @@ typedef struct kernel_poly_crossings {
     const polyhedron *cell;
     vm rays;         /* rays for which crossings are computed */
     bool has_colour; /* whether colour values w are computed too */
-    vf *x, *y;       /* x and y, relative to the rays, of the projected vertices and centre */
-    vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
+    vf *x, *y;       /* x and y, relative to the rays, of the vertices, then of the centre, projected along the rays */
+    vf *edge;        /* edge functions of the edges, then of the edges from each vertex to the centre */
     /* crossings of surface triangles, by the index of the triangle; only those of triangles that are listed in `met`
      * are set */
     kernel_triangle_crossings *facets;
@@ -67,11 +70,13 @@ typedef struct kernel_poly_crossings {
     vm uneven;
     int *met; /* indices of the surface triangles that some ray crosses, or whose quad's patch it crosses */
     int met_count;
-    /* crossings of sheets, by the index of the edge; only those listed in met_sheets are set */
+    /* crossings of sheets (the triangles between an edge and the centre), by the index of the edge; only those listed
+     * in met_sheets are set */
     kernel_triangle_crossings *sheets;
     int *met_sheets;
     int sheet_count;
-    kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
+    /* for each surface triangle, the intervals of the rays in the tet between it and the centre */
+    kernel_interval *tets;
     bool has_sheets, has_tets;
     /* interval: the current interval of each ray inside the cell (kernel_poly_find_next_interval()), with the values on
      * the faces; in, out: the crossings at its ends; u_in, u_out: the field just inside the ends */
@@ -132,7 +137,7 @@ SIMD_INLINE kernel_edge_error kernel_polyhedron_compute_line(polyhedron *c, cons
                              kernel_polyhedron_position(c, b));
 }
 
-/* Returns the polyhedron with the values of a layer's field; NULL if they are not all finite, or if memory ran out. */
+/* Returns the polyhedron with the values of a layer's field; NULL if a value is not finite, or if memory ran out. */
 SIMD_INLINE polyhedron *kernel_polyhedron_find(kernel_packet *p, const grid_field *field, int part, int layer,
                                                uint32_t index)
 {
@@ -184,9 +189,9 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
                              kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
-/* Computes the crossings of a surface triangle and returns the rays that have one. *w receives the weights that are
- * computed from the lines of the triangle's edges. On rays on which these weights are not accurate enough, the
- * crossings are computed with weights from the projected vertices; *w does not receive those. */
+/* Computes the crossings of a surface triangle and returns the rays that have one. *w becomes the weights that are
+ * computed from the stored edge functions (r->edge). On rays on which these weights are not accurate enough, the
+ * crossings are computed with weights from the projected vertices, but *w is not changed. */
 static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
                                   kernel_triangle_crossings *out)
 {
@@ -228,8 +233,9 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
     out->e32 = kernel_facet_edge_function(t[1], r, corner[3], corner[2]);
 }
 
-/* Sets t_face, v_face and w_face of a surface triangle's crossing *m from a crossing of its quad's patch (at), for the
- * rays in `mine`. For those of them that do not cross the triangle itself, t, v and w are also set from the patch. */
+/* Sets t_face, v_face and w_face of the crossings *m of a surface triangle, for the rays in `mine`. at: the crossings
+ * of these rays with the bilinear patch of the quad of which the triangle is one half. For those of the rays that do
+ * not cross the triangle itself, t, v and w are set to the same numbers. */
 SIMD_INLINE void kernel_facet_set_point_of_face(const polyhedron *c, const int corner[4], const kernel_point *at,
                                                 vm mine, bool has_colour, kernel_triangle_crossings *m)
 {
@@ -244,8 +250,8 @@ SIMD_INLINE void kernel_facet_set_point_of_face(const polyhedron *c, const int c
     m->w = vf_select(apart, m->w_face, m->w);
 }
 
-/* For rays that cross the patch twice and also both triangles, exchanges the two points of the patch if necessary, so
- * that the nearer one belongs to the triangle that is crossed first. */
+/* Orders the two points of rays that cross a quad's patch twice and also both of its triangles m[0] and m[1]: places[n]
+ * becomes the point that belongs to m[n], which is the nearer point for the triangle that is crossed first. */
 static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
                                                                     kernel_point places[2])
 {
@@ -319,8 +325,8 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
     return r->met_count > 0;
 }
 
-/* Removes each ray's nearest crossing (least t_face) from the list and stores it in *out. Returns false if no ray has a
- * crossing left. */
+/* Removes each ray's nearest crossing, that with the least t_face, from the list of crossings that belong to no
+ * interval yet, and stores it in *out. Returns false if this list has no crossing of any ray. */
 SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_triangle_crossings *out)
 {
     const vf zero = vf_set(0);
@@ -358,7 +364,7 @@ static bool kernel_poly_find_next_interval(kernel_poly_crossings *r)
     return true;
 }
 
-/* ---- the field inside ---- */
+/* ---- the field inside the polyhedron ---- */
 
 static void kernel_poly_cross_sheets(kernel_poly_crossings *r)
 {
@@ -379,8 +385,8 @@ static void kernel_poly_cross_sheets(kernel_poly_crossings *r)
     }
 }
 
-/* Extends the intervals s of the rays in `hit` inside a tet, so that they contain the crossings m of one of the tet's
- * faces. */
+/* Extends the intervals *s of rays inside a tet, so that they contain the crossings *m of one of the tet's faces. hit:
+ * the rays that cross this face. */
 SIMD_INLINE void kernel_subtet_extend(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
@@ -393,7 +399,8 @@ SIMD_INLINE void kernel_subtet_extend(kernel_interval *s, const kernel_triangle_
     s->mask = vm_or(s->mask, hit);
 }
 
-/* Computes the intervals of the rays in all tets of the cell (r->tets). Tets without volume get none. */
+/* Computes the intervals of the rays in all tets of the cell (r->tets). For tets without volume, no ray gets an
+ * interval. */
 static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
@@ -410,8 +417,8 @@ static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
                 kernel_subtet_extend(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
-        /* a ray in the tet crosses at least one of its sheets; it crosses the tet's surface triangle if it is inside
-         * all three edges */
+        /* a ray through the tet crosses at least one of the tet's three sheets; it may also cross the tet's fourth
+         * face, the surface triangle */
         const vm hit =
             kernel_rays_inside_triangle(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (vm_any(hit)) kernel_subtet_extend(s, &r->facets[i], hit);
@@ -419,8 +426,8 @@ static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
 }
 
 /* Returns the rays for which t is in the ray's interval inside the tet. The interval is [t_in, t_out), or (t_in, t_out]
- * if `before` is set. Callers set `before` if they need the limit of the field as t is approached from smaller
- * depths. */
+ * if `before` is set. Callers set `before` if they need the limit of the field for depths that approach t from
+ * below. */
 SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool before)
 {
     if (before) return vm_and(s->mask, vm_and(vf_lt(s->t_in, t), vf_le(t, s->t_out)));
@@ -432,8 +439,8 @@ SIMD_INLINE vf kernel_subtet_interpolate_value(const kernel_interval *s, vf t, v
     return v_in + (t - s->t_in) * ((v_out - v_in) / (s->t_out - s->t_in));
 }
 
-/* Computes the field *v and the colour field *w at depth t, as sums over the tets that contain the ray's point, each
- * with the tet's sign. The signs of these tets should sum to 1. By rounding they may not, because the ends of
+/* Computes the field *v and the colour field *w at depth t: sums over the tets that contain the ray's point of the
+ * tet's field times its sign. The signs of these tets should sum to 1. By rounding they may not, because the ends of
  * neighbouring tets' intervals, which should be equal, are in the wrong order. Then the sum is computed at slightly
  * smaller and larger t; if that fails too, *v and *w are left unchanged. */
 static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, vf t, bool before, vf *v, vf *w)
@@ -460,10 +467,10 @@ static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, 
     }
 }
 
-/* Returns the rays whose crossing of the sheet lies in the current interval. It must lie between the ray's crossings of
- * the two surface triangles at the interval's ends, and also between its crossings of the two faces to which these
- * triangles belong. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its
- * field. */
+/* Returns the rays whose crossing of a sheet lies in the current interval. The crossing must lie between the ray's
+ * crossings of the two surface triangles at the interval's ends, and also between its crossings of the two faces of
+ * which these triangles are parts. A sheet beyond the triangles belongs to a tet that extends out of the cell, and does
+ * not affect the cell's field. */
 SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
     const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));
@@ -471,8 +478,9 @@ SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, con
     return vm_and(vm_and(r->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
-/* Computes the field just inside an end of the interval: the value on the face, plus the signed sum of the fields of
- * all tets other than the one whose surface triangle is crossed. */
+/* Computes the field *u and the colour field *w just inside an end of the interval: the value on the face, plus the
+ * signed sum of the fields of all tets other than the one whose surface triangle is crossed (end). before: set for the
+ * far end. */
 SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_triangle_crossings *end,
                                          bool before, vf *u, vf *w)
 {
@@ -482,8 +490,8 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
     *w = end->w_face + (w_sum - end->w);
 }
 
-/* Prepares the profile of the current interval (the piecewise linear field along each ray): computes the field at the
- * crossed sheets and just inside both ends. */
+/* Computes the data from which kernel_profile_next() returns the piecewise linear field along each ray in the current
+ * interval: the field at the crossed sheets and just inside both ends. */
 static void kernel_poly_prepare_profile(kernel_poly_crossings *r)
 {
     kernel_interval *i = &r->interval;
@@ -503,8 +511,8 @@ static void kernel_poly_prepare_profile(kernel_poly_crossings *r)
     }
 }
 
-/* Sets *piece to a piece of length zero at the begin of each ray's profile, the piecewise linear field along the
- * ray. */
+/* Sets *piece to an interval of length zero at the begin of each ray's current interval. kernel_profile_next() then
+ * returns the first linear piece of the field. */
 SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_interval *piece)
 {
     const kernel_interval *i = &r->interval;

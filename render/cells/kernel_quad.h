@@ -125,9 +125,9 @@ static inline double kernel_scalar_zero(double v0, double v1)
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Returns the patch's parameter for a quadratic A or B (see the top of this file) that is zero for all parameters, as
- * the limit for rays that are moved by (e, e²). The quad's two sides at the ends of the parameter's range are from
- * corner i to i2 and from corner j to j2. */
+/* Returns the patch's parameter at the ray's point if the quadratic A or B of this parameter (see the top of this file)
+ * is zero everywhere: the limit of the parameters on rays that are moved by (e, e²). The quad's two sides at the ends
+ * of the parameter's range are from corner i to i2 and from corner j to j2. */
 static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, int i2, int j, int j2)
 {
     double x[4], y[4];
@@ -136,8 +136,9 @@ static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, 
     return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(x[i2] - x[i], x[j2] - x[j]);
 }
 
-/* Computes, for one lane, the point of the patch at which the patch's Jacobian J has the sign of `root`. The magnitude
- * of root is the square root of the discriminant D. */
+/* Computes, for the ray in one lane, the point at which it meets the patch and at which the patch's Jacobian J has the
+ * sign of `root`. The magnitude of root is the square root of the discriminant D. (The top of this file defines J and
+ * D.) */
 static inline void kernel_scalar_point(const kernel_quad *q, int lane, const kernel_scalar_quadratic *a,
                                        const kernel_scalar_quadratic *b, double root, kernel_point *out)
 {
@@ -161,8 +162,8 @@ static inline void kernel_scalar_single_point(const kernel_quad *q, int lane, ke
     kernel_scalar_point(q, lane, &a, &b, by_b != is_rising ? root : -root, out);
 }
 
-/* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
- * the other. */
+/* Returns whether the quadratic may have two roots in (0, 1), because c0 and c2, its values at 0 and 1, have one sign
+ * and c1 has the other. */
 static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadratic *c)
 {
     return !kernel_scalar_changes_sign(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
@@ -205,8 +206,8 @@ static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_qu
 /* ---- a packet, in float32 ---- */
 
 /* The patch's point, relative to the ray, is a + s e + r g + s r h. a: corner 0; e: corner 1 - corner 0; g: corner 3 -
- * corner 0; h: corner 0 - corner 1 + corner 2 - corner 3. ez: the larger extent in depth of the two sides along s; gz:
- * the same for the two sides along r. */
+ * corner 0; h: corner 0 - corner 1 + corner 2 - corner 3. ez: the larger one of the extents in depth of the two sides
+ * along which s varies; gz: the same for the two sides along which r varies. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
     vf ez, gz;
@@ -233,8 +234,8 @@ SIMD_INLINE void kernel_patch_evaluate(kernel_patch *p, vf s, vf r)
     p->det = p->sx * p->ry - p->sy * p->rx;
 }
 
-/* Number of steps of Newton's method by which the parameters (s, r) of a ray's point are computed; they are clamped to
- * [0, 1]. Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
+/* Number of steps of Newton's method by which the parameters (s, r) of a ray's point are computed. The parameters are
+ * clamped to [0, 1]. Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
 enum { KERNEL_PATCH_STEPS = 4 };
 
 SIMD_INLINE void kernel_patch_step(kernel_patch *p, vf *s, vf *r)
@@ -272,8 +273,8 @@ SIMD_INLINE vf kernel_guess_patch_parameter(const kernel_quad *q, int i, int j, 
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Computes the points of the wanted rays as kernel_quad_single_point() does, for rays that meet no edge. The edge
- * functions need not be set: they are computed from the projected corners. */
+/* Computes the points of the wanted rays as kernel_quad_single_point() does, for rays that meet no edge. The members of
+ * *q for edge functions need not be set, because the edge functions are computed from the projected corners. */
 static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
                                                                          kernel_point *out)
 {
@@ -315,22 +316,22 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-/* Returns those of the rays that may meet the patch twice, as far as the signs of the edge functions of its sides tell.
- * A ray that crosses exactly one triangle is never among them. */
+/* Returns those of the rays that may meet the patch twice according to the signs of the edge functions of its four
+ * sides. A ray that crosses exactly one triangle is never among them. */
 SIMD_INLINE vm kernel_quad_sides_allow_two_points(vm rays, vf e01, vf e32, vf e03, vf e12)
 {
     const vi b = vi_from_bits(e01) ^ vi_from_bits(e32), a = vi_from_bits(e03) ^ vi_from_bits(e12);
     return vm_and(rays, vm_sign(~(a | b)));
 }
 
-/* Returns v, negated in lanes in which `other` is negative. */
+/* Returns v, negated in lanes in which the sign bit of `other` is set. */
 SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
 {
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
-/* Returns those of the rays that may meet the patch twice if the signs of a1 and b1 (see the top of this file) are
- * considered too. rays: the result of kernel_quad_sides_allow_two_points(). */
+/* Returns those of the rays that may meet the patch twice according to the signs of a1 and b1 (see the top of this
+ * file). rays: the result of kernel_quad_sides_allow_two_points(). */
 SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -341,9 +342,9 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: the rays on the negative side of the
- * quad's edge i; the edges are in cyclic order and begin at the diagonal's first corner. side: the rays on the negative
- * side of the diagonal. */
+/* Returns the rays that cross exactly one of the two triangles into which a diagonal splits a quad. around[i]: the rays
+ * on which the edge function of the quad's edge i is negative; the edges are in cyclic order and begin at the
+ * diagonal's first corner. side: the rays on which the diagonal's edge function is negative. */
 SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
@@ -351,9 +352,10 @@ SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
     return vm_xor(half0, half1);
 }
 
-/* Returns those of the rays that may meet a quad's patch twice if the discriminant D (see the top of this file) is
- * considered too. across, other: cross products of corners 0 and 2, and of corners 3 and 1. A ray is excluded only if
- * the discriminant is negative by more than its rounding in float32, which is below a millionth of its terms. */
+/* Returns those of the rays that may meet a quad's patch twice according to the discriminant D (see the top of this
+ * file). across, other: cross products of corners 0 and 2, and of corners 3 and 1. A ray is excluded only if the
+ * discriminant is negative by more than its rounding error in float32, which is less than a millionth of the sum of its
+ * terms' magnitudes. */
 static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminant(const vf x[8], const vf y[8],
                                                                                   const signed char *loop, vm rays,
                                                                                   vf across, vf other)
@@ -367,7 +369,7 @@ static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminan
 /* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and, because of rounding,
  * a few more. Let all four edges be directed around the quad. Only a ray that is on different sides of two opposite
  * edges can meet the patch twice. x, y: projected vertices; loop: corners 0 to 3 in cyclic order; side[i]: the rays on
- * the negative side of the edge from corner i to the next. */
+ * which the edge function of the edge from corner i to the next is negative. */
 SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const signed char *loop, vm rays,
                                              const vm side[4])
 {
@@ -439,8 +441,8 @@ SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf s
 }
 
 /* Returns, per lane, a mask of the cell's faces with the bits of the quads that may not look convex along some ray of a
- * box. at: x, y, z of the cells' vertices. slope and origin: [axis][end] has those of the first and the last ray of the
- * box along each axis of the tile. */
+ * box. at: x, y, z of the cells' vertices. slope[axis][end], origin[axis][end]: slope and origin along an axis of the
+ * tile of the first (end = 0) and the last ray (end = 1) of the box along this axis. */
 SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], vf (*const slope)[2], vf (*const origin)[2], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -459,7 +461,7 @@ SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], vf (*const slope
         square[n] = (x * x + y * y) + z * z;
         longest = vf_max(square[n], longest);
     }
-    /* Every vertex is at most three edges away from the first. */
+    /* Every vertex can be reached from the first by at most three edges. */
     const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
     for (int a = 0; a < 2; a++)
         reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(origin[a][0]), vf_abs(origin[a][1]))) + steep[a] * depth;

@@ -11,8 +11,8 @@
 enum { KERNEL_TET_EDGES = 6 };
 static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/* The faces of a tet; face n does not have vertex 3 - n. For each face: its vertices i, j, k, then the indices of the
- * edges ij, jk and ik in kernel_tet_edge. */
+/* The faces of a tet: for each face, its vertices i, j, k, then the indices of the edges ij, jk and ik in
+ * kernel_tet_edge. Face n is opposite to vertex 3 - n. */
 static const signed char kernel_tet_face[4][6] = {
     {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
 
@@ -25,8 +25,8 @@ typedef struct kernel_shape {
     struct {
         int count;
         signed char vertices[4];
-        /* for the side from each vertex of the face to the next: the index of the cell's edge along it, and 1 if this
-         * edge is stored in the opposite direction, otherwise 0 */
+        /* sides[n], for the side from vertex n of the face to the next: index in `edges` of the cell's edge that is
+         * this side; then 1 if this edge is stored in the opposite direction, otherwise 0 */
         signed char sides[4][2];
     } faces[6];
     float corners[GRID_MAX_CELL_VERTICES][3]; /* reference coordinates of the vertices */
@@ -83,8 +83,8 @@ SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
     return ~differ;
 }
 
-/* Returns one of a vertex's reference coordinates, which is 0 or 1. corner: index of the vertex in each ray's cell;
- * axis: 0, 1 or 2. */
+/* Returns, for each ray, a reference coordinate of a vertex of the ray's cell: 0 or 1. corner: index of the vertex in
+ * the cell; axis: which of the three reference coordinates; count: number of vertices. */
 SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int count, int axis, vi corner)
 {
     int bits = 0;
@@ -92,9 +92,9 @@ SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int co
     return vf_from_vi(vi_set(bits) >> corner & 1);
 }
 
-/* Each ray crosses two faces of its cell. Returns the rays for which one of these two faces is a quad. face: index of
- * that face in the cell; n: 0 if it is the face with the smaller index, 1 if it is the other. In a wedge, faces 0 and 1
- * are triangles. In a pyramid, face 0 is the only quad, so that it never has the larger index. */
+/* Returns the rays on which a crossed face is a quad. face: index, in each ray's cell, of one of the two faces that the
+ * ray crosses; n: 0 if it is the one with the smaller index, 1 if it is the other one. In a wedge, faces 0 and 1 are
+ * triangles. In a pyramid, face 0 is the only quad, so that it never has the larger index. */
 SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
     const vf number = vf_from_vi(face);

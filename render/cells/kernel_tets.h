@@ -14,8 +14,8 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* Rays and their tets. The tet of each ray is in the lane lane_rays->lane of `transformed`, or in `lane` for all rays
- * if is_uniform is set. */
+/* Rays and their tets. The tet of each ray is in the lane lane_rays->lane of `transformed`. If is_uniform is set, all
+ * rays have the tet in the lane `lane` instead. */
 typedef struct kernel_tets {
     const kernel_lane_rays *lane_rays;
     const kernel_transformed_tets *transformed;
@@ -29,7 +29,7 @@ typedef struct kernel_tets {
                      : vf_permute((t)->transformed->member, (t)->lane_rays->lane))
 
 /* Returns a copy of *t, to be passed to a function that is not inlined, so that the original stays in registers. rays:
- * memory for a copy of the lane rays. */
+ * memory for a copy of *t->lane_rays. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
 {
     kernel_tets out = *t;
@@ -71,8 +71,8 @@ static __attribute__((noinline)) void kernel_tets_recompute_uncertain_edges(cons
     }
 }
 
-/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if they are computed from the edges'
- * lines (kernel_cell.h), which are valid for camera rays through the tile's pixels; otherwise they are computed from
+/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if e is computed from the edges'
+ * lines (kernel_cell.h), which are valid for camera rays through the tile's pixels; otherwise e is computed from
  * projected vertices. */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
@@ -134,8 +134,8 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* Selects, for each ray, the sums of the two faces that it crosses. ends[0] gets those of the face with the smaller
- * index, ends[1] those of the other face. Either face may be the nearer one. */
+/* Selects, for each ray, the weighted sums (kernel_sums) of the two faces that the ray crosses. ends[0] gets those of
+ * the face with the smaller index, ends[1] those of the other face. Either face may be the nearer one. */
 SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
@@ -144,20 +144,22 @@ SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_
     ends[1] = kernel_sums_select(hit[3], &sums[3], &b);
 }
 
-/* Returns the index of the face whose sums kernel_tets_select_crossed_faces() selects for ends[0]. */
+/* Returns, for each ray, the index of the face whose weighted sums kernel_tets_select_crossed_faces() selects for
+ * ends[0]. */
 SIMD_INLINE vi kernel_tets_first_face(const vm hit[4])
 {
     return vi_select(hit[0], vi_set(0), vi_select(hit[1], vi_set(1), vi_set(2)));
 }
 
-/* Returns the index of the face whose sums kernel_tets_select_crossed_faces() selects for ends[1]. */
+/* Returns, for each ray, the index of the face whose weighted sums kernel_tets_select_crossed_faces() selects for
+ * ends[1]. */
 SIMD_INLINE vi kernel_tets_second_face(const vm hit[4])
 {
     return vi_select(hit[3], vi_set(3), vi_select(hit[2], vi_set(2), vi_set(1)));
 }
 
-/* Computes depth and values of both crossings by dividing their sums by the sum of the weights. The nearer crossing
- * becomes the begin of the interval (t_in and so on), the other its end. */
+/* Computes depth and values of both crossings by dividing the weighted sums by the sum of the weights. The nearer
+ * crossing becomes the begin of the interval (members _in), the other its end (members _out). */
 SIMD_INLINE void kernel_tets_set_interval(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
 {
     const vf scale_a = 1.0f / ends[0].weight, scale_b = 1.0f / ends[1].weight;
@@ -180,9 +182,9 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n])));
 }
 
-/* Selects the sums of the two crossed faces as kernel_tets_select_crossed_faces() does. But for rays on which a face's
- * weights are not accurate enough, the sums are first computed anew from edge functions of projected vertices. It is
- * not inlined, because few rays have inaccurate weights. */
+/* Selects the weighted sums of the two crossed faces as kernel_tets_select_crossed_faces() does. But for rays on which
+ * a face's weights are not accurate enough, the sums are first computed anew, from edge functions of projected
+ * vertices. This function is not inlined, because few rays have inaccurate weights. */
 static __attribute__((noinline, cold)) void
 kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour, kernel_sums ends[2])
 {

@@ -36,20 +36,20 @@ typedef struct kernel_transformed_curved {
      * from bit 0 on. Quads are in the order of kernel_quad_corners(), triangles in the order of coordinates
      * (kernel_triangle_order()). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
-    /* Lines of the triangular faces, which come in the order of the faces in kernel_shape. By triangle: the members c,
-     * cu, cv and bound of kernel_line, each for the edges ij, jk and ik, where i, j, k are the triangle's corners in
-     * the order of coordinates. */
+    /* The lines (kernel_line) of the edges of triangular faces. triangles[n] belongs to the n-th triangular face in the
+     * list of faces of kernel_shape: the members c, cu, cv and bound, each for the edges ij, jk and ik, where i, j, k
+     * are the triangle's corners in the order of coordinates. */
     float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
     /* for each triangle, the least sum of weights at which its crossings are accurate
      * (kernel_compute_triangle_least_weight()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
     /* The following two members are used only for segments of volumes (kernel_local_crossings.h). nonconvex: per cell,
-     * the bits of a mask of the quads that may be nonconvex in the projection along some ray through the cell's pixels
-     * (kernel_curved_nonconvex_quads()). */
+     * a mask of its faces, stored as the bits of a float; a bit is set if the face is a quad that may be nonconvex in
+     * the projection along some ray through the cell's pixels (kernel_curved_nonconvex_quads()). */
     float nonconvex[SIMD_WIDTH];
-    /* for vectors of 16 lanes: a copy of the data, cell by cell instead of lane by lane, in three rows of 16 numbers: x
-     * and y by vertex; z and the field by vertex; `corners` by face */
+    /* for vectors of 16 lanes: a copy of `at` and `corners` in which the numbers of a cell are contiguous, in three
+     * rows of 16 numbers per cell: x and y by vertex; z and the field by vertex; `corners` by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which copies one lane's cell. world:
      * coordinates by vertex and axis, in two halves of the lanes; rank: rank of each vertex in the order of
@@ -58,13 +58,14 @@ typedef struct kernel_transformed_curved {
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
-/* Returns the index, in the type's shape, of its first triangular face; further triangles follow it. */
+/* Returns the index of the first triangular face in the list of faces of a cell type's kernel_shape; the other
+ * triangular faces follow it. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
     return kernel_has_apex(type) ? 1 : 0;
 }
 
-/* ---- numbers of each ray's own cell ---- */
+/* ---- gathering numbers of each ray's cell ---- */
 
 /* Returns of[corner][lane] for each ray: a number that belongs to the vertex (or face) with the index `corner` of the
  * cell in `lane`. Cells have `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a
@@ -112,7 +113,8 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
  * the neighbours of vertex 0 increase along x, y, z. */
 SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
 {
-    /* index of the vertex whose reference coordinates x, y, z have these three bits */
+    /* vertex[b]: index of the hex's vertex whose reference coordinates x, y and z, each 0 or 1, are bits 0, 1 and 2 of
+     * b */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
@@ -189,9 +191,9 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, b
     return out;
 }
 
-/* Returns the lanes whose hex has edges parallel to the world axes. In canonical order, the reference coordinates of
- * such a hex run along z, y and x. Each coordinate of a vertex then equals that of vertex 0 or that of the neighbour of
- * vertex 0 along the axis. */
+/* Returns the lanes whose hex has edges parallel to the world axes. In canonical order, the first, second and third
+ * reference coordinate of such a hex increase along the world's z, y and x axis. Each world coordinate of a vertex then
+ * equals that of vertex 0 or that of the neighbour of vertex 0 along this axis. */
 SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     static const int neighbours[3] = {4, 3, 1};
@@ -229,9 +231,9 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 
 /* ---- edge functions ---- */
 
-/* Returns a word with the indices, in the cell, of the vertices at a quad's corners, four bits each, from bit 0 on.
- * They begin at the corner of smallest rank and go around the quad towards that one of its neighbours with the smaller
- * rank. loop: the quad's vertices in cyclic order. */
+/* Returns a word with the indices, in the cell, of the vertices at a quad's corners, four bits each, from bit 0 on. The
+ * corners are listed in cyclic order: first the corner of smallest rank, then that one of its two neighbours which has
+ * the smaller rank. loop: the quad's vertices in cyclic order. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
@@ -270,8 +272,8 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], v
     return word;
 }
 
-/* Permutes three numbers that belong to a triangle's sides into the order ij, jk, ik, where i, j, k are the corners
- * sorted by rank. opposite[n]: the number that belongs to the side opposite to corner n of the loop. first, last: from
+/* Permutes three numbers, one per side of a triangle, into the order of the sides ij, jk, ik, where i, j, k are the
+ * corners sorted by rank. opposite[n]: the number of the side opposite to corner n of the loop. first, last: from
  * kernel_triangle_word(). The sides ij, jk and ik are opposite to the corners k, i and j. */
 SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
 {
@@ -281,8 +283,8 @@ SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const v
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(first[i], last[i])), opposite[i], out[2]);
 }
 
-/* Computes six numbers for each edge of the shape, from its first vertex to its second: c, cu, cv and bound of
- * kernel_line, then error and extent of kernel_edge_error. */
+/* Computes six numbers for each of the cell's edges, directed from its first vertex to its second: c, cu, cv and bound
+ * of kernel_line, then error and extent of kernel_edge_error. */
 SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *transformed, const kernel_frame *f,
                                              const kernel_tile *tile, int type, vf out[KERNEL_CURVED_EDGES][6])
 {
@@ -349,18 +351,18 @@ SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, con
     }
 }
 
-/* Computes, for all faces, the words that list their corners (the member `corners`), and the lines of the triangular
- * faces. */
+/* Computes, for all faces, the words that list their corners (the member `corners`), and, for triangular faces, the
+ * lines of their edges and the least sums of weights (`triangles` and `least`). */
 static __attribute__((noinline)) void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
                                                                const kernel_tile *tile, int type)
 {
     KERNEL_OF_TYPE(type, kernel_transformed_faces_of, out, f, tile);
 }
 
-/* ---- cells of lattices ---- */
+/* ---- cells of uniform and rectilinear grids ---- */
 
-/* Returns whether in all lanes the coordinates increase along all axes of the lattice, so that the order of coordinates
- * is known without sorting. */
+/* Returns whether in all lanes the coordinates increase along all axes of the grid, so that the lexicographic order of
+ * a cell's vertices is known without sorting. cells: from kernel_lattice_cells_read(). */
 SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_f64 (*cells)[3][2])
 {
     vm sorted = vm_all_lanes();
@@ -370,7 +372,7 @@ SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_f64 (*cells)[3][2]
 
 /* Transforms the vertices of cuboids into tile space. The results are bit-identical to those of
  * kernel_lanes_transform() for single vertices, but each product is computed once for all vertices that share it. In
- * the canonical order, bits 0, 1 and 2 of a vertex's reference coordinates stand for z, y and x. */
+ * canonical order, the first, second and third reference coordinate of a vertex belong to z, y and x. */
 SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2], const kernel_frame *f,
                                                 const kernel_tile *tile, int half, kernel_transformed_curved *out,
                                                 int type)
@@ -394,13 +396,13 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2],
     }
 }
 
-/* Stores cells of a lattice in canonical order. The result is bit-identical to that of the functions for general
- * hexes. */
+/* Stores cells of a uniform or rectilinear grid in canonical order, and transforms them into tile space. The result is
+ * bit-identical to that of the functions for general hexes. */
 SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int32_t (*const vertices)[SIMD_WIDTH],
                                             const kernel_frame *f, const kernel_tile *tile,
                                             kernel_transformed_curved *out, int type)
 {
-    /* for each vertex in canonical order: its index in the lattice's cell, and its rank */
+    /* for each vertex in canonical order: its index in VTK's order of a hex's vertices, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     for (int i = 0; i < 8; i++) {
         const vi own_rank = vi_set(rank[i]);
@@ -413,7 +415,7 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int
     out->cuboids = vm_bits(vm_all_lanes());
 }
 
-/* ---- whole cells ---- */
+/* ---- reading and transforming cells ---- */
 
 /* Reads the vertices, puts them in canonical order and transforms them. Returns the lanes whose cell has an edge of
  * length zero. */
@@ -469,9 +471,9 @@ static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_c
     return KERNEL_OF_TYPE(type, kernel_transform_curved_of_type, out, p, f, tile, vertices, isovalues);
 }
 
-/* ---- extracting one cell ---- */
+/* ---- copying one lane's cell ---- */
 
-/* Copies the cell in lane n to a kernel_cell, without edge functions. */
+/* Copies the cell in lane n to a kernel_cell. The lines of the cell's edges are not copied. */
 static __attribute__((noinline)) void kernel_transformed_curved_cell(const kernel_transformed_curved *h, int type,
                                                                      int n, kernel_cell *c)
 {
@@ -497,7 +499,8 @@ SIMD_INLINE vi kernel_least_bit(vi bits)
 
 /* Finds those of the rays that cross exactly two faces (*two), and the indices of these faces in the cell (face), the
  * smaller one first. faces: per ray, one bit for each face that the ray crosses once. *alone: on entry, rays that must
- * be traced cell by cell in any case; those of the rays that cross more than two faces are added. */
+ * be traced cell by cell for other reasons; on return, only those in `rays`, and also the rays that cross more than two
+ * faces. */
 SIMD_INLINE void kernel_curved_find_two_faces(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);

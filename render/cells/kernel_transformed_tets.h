@@ -18,12 +18,13 @@
 #include "simd.h"
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
- * members of kernel_line, by edge; doubt: the largest bound of the tet's edge functions; least: for each face, the
+ * members of kernel_line, by edge; doubt: the largest one of the six entries of `bound`; least: for each face, the
  * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices of the vertices in the
  * mesh. The caller sets f, the vertex values as the layer needs them (kernel_cell.f), and, if the layer has a colour
  * field, `colours`, the values of that field. */
 typedef struct kernel_transformed_tets {
-    /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
+    /* world coordinates by vertex and axis, and values by vertex, as the caller of the library passed them; in two
+     * halves of the lanes */
     kernel_f64 world[4][3][2], values[4][2];
     vf at[3][4], f[4], colours[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
@@ -31,8 +32,8 @@ typedef struct kernel_transformed_tets {
     vi vertex[4];
 } kernel_transformed_tets;
 
-/* Reads the vertices, with their values unless these belong to cells, and sorts them by coordinates. A bubble sort is
- * used, because it keeps the order of vertices with equal coordinates. */
+/* Reads the vertices, and their values unless the field is cell-centred, and sorts the vertices by coordinates. A
+ * bubble sort is used, because it keeps the order of vertices with equal coordinates. */
 SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
                                          int32_t (*const vertices)[SIMD_WIDTH])
 {
@@ -98,7 +99,7 @@ static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transf
 }
 
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
- * lanes get the vertices of the first tet. If values belong to cells, they are not read. */
+ * lanes get the vertices of the first tet. Values of a cell-centred field are not read. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[4][SIMD_WIDTH], int count)

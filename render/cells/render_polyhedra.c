@@ -1,11 +1,12 @@
 /* Decomposes polyhedra.
  *
- * The caller's mesh is a list of faces per cell and of vertices per face. Rays need the canonical triangles of the
- * surface (each face is cut as polygon.h defines), the unique edges, and the centre, which forms with each triangle a
- * tet on which the field is linear. All of this is computed when a ray of a tile first meets the cell, and deleted with
- * the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes
- * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. When a store is full, all of its polyhedra are
- * removed, and its memory is doubled, up to STORE_LIMIT bytes or, if that is more, the size of one polyhedron.
+ * The caller's mesh is a list of faces per cell and of vertices per face. To intersect rays with a cell, the kernels
+ * need the triangles of its surface (each face is cut into triangles as polygon.h defines), its edges, each once, and
+ * its centre, which forms with each triangle a tet on which the field is linear. All of this is computed when a ray of
+ * a tile first meets the cell, and deleted with the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2
+ * v - 4 triangles and 3 v - 6 edges, and takes about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices.
+ * When a thread's store is full, all of its polyhedra are removed, and its memory is enlarged, unless twice its size
+ * would be STORE_LIMIT bytes or more. If a single polyhedron needs more memory, that much is allocated.
  *
  * Vertices are sorted by coordinates, triangles by their vertices, and edges are stored in the order in which the
  * triangles first use them. So the polyhedron is bit-identical for any numbering of the mesh and any order of faces or
@@ -27,7 +28,7 @@ struct polyhedron_store {
     polyhedron *table[1 << TABLE_BITS];
     char *memory; /* the polyhedra, one after the other */
     size_t memory_bytes, used;
-    char *work, *scratch; /* buffers for decomposing a cell, and for the kernels' temporary arrays */
+    char *work, *scratch; /* buffers for the temporary arrays of decompose_polyhedron() and for those of the kernels */
     size_t work_bytes, scratch_bytes;
 };
 
@@ -99,7 +100,7 @@ typedef struct work {
     const grid *g;
     const grid_field *field;
     closed_faces faces;
-    int *rank; /* rank of each vertex, by the index that it has before sorting */
+    int *rank; /* rank of each vertex in the order of coordinates, by the index that the vertex has before sorting */
     double (*positions)[3];
     work_vertex *vertices;
 } work;
@@ -135,8 +136,8 @@ static int facet_compare(const closed_triangle *a, const closed_triangle *b)
 DEFINE_SORT(sort_vertices, work_vertex, vertex_compare)
 DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 
-/* Assigns each temporary array its part of the buffer, and returns the size of all arrays in bytes. If the buffer is
- * NULL, only the size is computed. */
+/* Sets the pointers to the temporary arrays of *w to consecutive parts of the buffer, and returns the size of all
+ * arrays in bytes. If the buffer is NULL, only the size is computed. */
 static size_t lay_out(work *w, char *buffer)
 {
     base_arena at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
@@ -185,8 +186,8 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
     return at.used;
 }
 
-/* Stores the vertices, sorted by coordinates, and their values. Computes the centre, which is the mean of the vertices,
- * by sums in this order. */
+/* Stores the vertices, sorted by coordinates, and their values. Then stores the centre, which is the mean of the
+ * vertices; its coordinates and value are summed in the order of the sorted vertices. */
 static void store_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};

@@ -20,8 +20,8 @@ typedef struct polyhedron_facet {
     float sign;
 } polyhedron_facet;
 
-/* A decomposed polyhedron. Vertices are stored in the lexicographic order of coordinates. The centre follows them, at
- * index vertex_count. The order of vertices, edges and facets depends only on the vertices' coordinates and values. */
+/* A decomposed polyhedron. Vertices are stored in the lexicographic order of coordinates, then the centre, at index
+ * vertex_count. The order of vertices, edges and facets depends only on the vertices' coordinates and values. */
 typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
@@ -32,18 +32,21 @@ typedef struct polyhedron {
     bool is_star_shaped; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;     /* set if `fall` and `rise` have been computed */
     int vertex_count, edge_count, facet_count;
-    double (*world)[3]; /* the arrays from `world` to `lines` have one entry for each vertex, and one for the centre */
+    double (*world)[3]; /* the arrays from `world` to `g` have one entry for each vertex, then one for the centre */
     double *values;
     float *x, *y, *z; /* vertices and centre in tile space */
-    /* f: vertex values of the layer's field, minus an isovalue and scaled, or in a transfer function's domain; g:
-     * vertex values of the colour field, in its transfer function's domain */
+    /* f: values of the layer's field, for a surface minus an isovalue and scaled, for a volume in the transfer
+     * function's domain; g: values of the colour field, in the domain of its transfer function */
     float *f, *g;
     double scale; /* factor by which the differences from the isovalue are multiplied in f */
-    /* upper bounds of the rates, per unit of t, at which the field falls and rises along the tile's rays in any tet */
+    /* upper bounds, over all tets of the cell and all rays of the tile, of the rates per unit of t at which the field
+     * falls and rises along a ray */
     double fall, rise;
-    /* members of kernel_line (kernel_cell.h): for the edges, then for the edges from each vertex to the centre */
+    /* the four members of kernel_line (kernel_cell.h), for each edge, then for the edge from each vertex to the
+     * centre */
     float (*lines)[4];
-    /* least sum of weights at which the crossings of all triangles are accurate (kernel_least_weight_bound()) */
+    /* if the sum of a crossing's weights is at least this, the crossing is accurate, whichever triangle is crossed
+     * (kernel_least_weight_bound()) */
     float least;
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];

@@ -6,10 +6,10 @@
 
 #include "kernel_types.h"
 
-/* Allocates and sets up the thread's memory, unless a former call has done so; at first all members of *thread must be
- * zero. It must be called by the thread itself, so that the memory is on the thread's NUMA node. kernels: the result of
- * render_kernels() in the thread that opened the parallel region. Returns false, with thread->out_of_memory set, if
- * there is no memory. */
+/* Allocates and sets up the thread's memory, unless a former call has done so. Before the first call all members of
+ * *thread must be zero. The thread itself must call this function, so that the memory is on the thread's NUMA node.
+ * kernels: the result of render_kernels() in the thread that opened the parallel region. Returns false, with
+ * thread->out_of_memory set, if there is no memory. */
 bool render_thread_begin(const kernel_frame *frame, const kernel_table *kernels, kernel_thread *thread);
 
 /* Frees everything that the thread has. */
