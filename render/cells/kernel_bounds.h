@@ -40,7 +40,8 @@ typedef struct kernel_bounds {
      * coordinates (kernel_map.h) */
     float nonlinear_part[3][4][SIMD_WIDTH];
     /* stretch: upper bound of the factor by which the inverse map stretches distances (L of kernel_roots.h); slope:
-     * upper bound of the field's gradient (G of kernel_roots.h) */
+     * upper bound of the magnitude of the field's gradient with respect to reference coordinates (G of
+     * kernel_roots.h) */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
     /* Upper bounds of the second derivatives of the field (H of kernel_roots.h) and of the map's nonlinear part (K).
      * For a pyramid they are upper bounds of these derivatives times the reference coordinate k, because the
@@ -61,8 +62,8 @@ typedef struct kernel_bounds {
 
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
 typedef struct kernel_bounds_lanes {
-    /* exact: polynomial coefficients (kernel_map.h) of the positions x, y, z (0 to 2) and of the field (3); apart:
-     * positions of the vertices relative to vertex 0 */
+    /* exact[n]: polynomial coefficients (kernel_map.h) of x, y and z (n = 0, 1, 2) and of the field (n = 3);
+     * apart[a][i]: coordinate a of vertex i minus that of vertex 0 */
     kernel_f64 exact[4][8], apart[3][8];
     /* nonlinear_part: coefficients 4 to 7 of the map's nonlinear part N; inverse: inverse of the Jacobian at the
      * centre; reach: largest |X|, |Y| and |Z| of the vertices in tile space */
@@ -565,7 +566,7 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
 typedef struct kernel_curved {
     int type;
     int lane; /* the lane that holds the cell, if all rays of a packet are traced in one cell */
-    /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
+    /* at[n][vertex][lane]: x, y, z in tile space (n = 0, 1, 2), and the field minus the isovalue, scaled (n = 3) */
     float (*at)[8][SIMD_WIDTH];
     float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     kernel_bounds *bounds;

@@ -75,8 +75,8 @@
  * that crosses the triangle its e errs by no more than r N times the edges next to it, which equals a displacement of
  * the vertices.) */
 
-/* A line: the affine edge function c + cu u + cv v of an edge, where (u, v) are the parameters of a ray. Its sign is
- * certain if its magnitude exceeds `bound`. */
+/* A line: the edge function c + cu u + cv v of an edge, where (u, v) is a ray's slope or, if the camera is
+ * orthographic, its origin. The sign of the edge function is certain if its magnitude exceeds `bound`. */
 typedef struct kernel_line {
     float c, cu, cv, bound;
 } kernel_line;
@@ -107,7 +107,7 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_p
                          6 * 6e-8f * (size_a * size_b)};
 }
 
-/* ---- accuracy of weights ---- */
+/* ---- accuracy of the weights of crossings ---- */
 
 /* Largest error of a crossing's depth, in t, that the rounding of weights may cause. The length of a ray's interval may
  * have an error of 1e-6 (tests/test_chords.c); the weights of its two crossings then cause at most half of this. */
@@ -312,8 +312,8 @@ SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID
     }
 }
 
-/* Computes each vertex's rank in the order of coordinates. The code has no branches, because their outcome would be
- * unpredictable. */
+/* Computes each vertex's rank in the lexicographic order of coordinates. The code has no branches, because the
+ * processor could not predict them. */
 SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count, int *rank)
 {
     for (int i = 0; i < count; i++) rank[i] = 0;
@@ -439,7 +439,8 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- edge functions of a cell ---- */
 
-/* Computes the lines of the edges and of the quads' diagonals of a hex, wedge or pyramid, unless this has been done. */
+/* Computes the lines (kernel_line) of the edges and of the quads' diagonals of a hex, wedge or pyramid, unless
+ * c->has_lines is set. */
 static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, const kernel_frame *f,
                                                               const kernel_tile *tile)
 {

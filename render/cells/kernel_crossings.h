@@ -244,7 +244,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 
 /* Computes the field and the cell's reference coordinates at a crossing of a quad's bilinear patch. corner: the quad's
  * vertices; at->r[0], at->r[1]: the patch's parameters at the crossing (kernel_quad.h). The isoparametric maps of both
- * cells contain this patch, so the field is continuous across the face. */
+ * cells that share the quad map their faces to this patch, so the field is continuous across the face. */
 SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_point *at,
                                     kernel_point *out)
 {
@@ -262,7 +262,7 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
     }
 }
 
-/* Sorts three of the cell's vertices by the order of coordinates. */
+/* Sorts three of the cell's vertices by their ranks in the lexicographic order of coordinates. */
 SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3], int out[3])
 {
     int i = corners[0], j = corners[1], k = corners[2], swap;

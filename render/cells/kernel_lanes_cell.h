@@ -14,8 +14,8 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* The vertices of one cell per lane while they are being sorted. at: coordinates; vertex: index in the mesh; rank: rank
- * in the order of coordinates, not set for tets. */
+/* The vertices of one cell per lane while they are being sorted. at: coordinates by vertex and axis; vertex: index of
+ * each vertex in the mesh; rank: rank of each vertex in the lexicographic order of coordinates, not set for tets. */
 typedef struct kernel_sorted_vertices {
     kernel_raw_numbers at[8][3];
     vi vertex[8];

@@ -273,9 +273,9 @@ SIMD_INLINE vf kernel_map_distance_outside(const vf r[3])
     return most;
 }
 
-/* Points whose reference coordinates are outside of [0, 1] by no more than this are accepted as points of the cell.
- * Points between the triangles of a warped face and its bilinear patch lie outside the domain, and so do points of
- * cells so flat that rounding matters. */
+/* Points whose reference coordinates are outside of [0, 1] by no more than this are accepted as points of the cell. A
+ * ray's point in the cell may have such coordinates if it lies between the two triangles of a warped face and the
+ * face's bilinear patch, or if the cell is so flat that rounding errors matter. */
 #define KERNEL_MAP_BEYOND 0.25f
 
 /* Computes the reference coordinates r of the points at depth t, for the rays in `wanted`, from a guess in r. From a

@@ -29,18 +29,18 @@ enum {
 
 /* Transformed cells of one type, one per lane. */
 typedef struct kernel_transformed_curved {
-    /* x, y, z in tile space, and the field minus the isovalue, scaled (kernel_cell_subtract_isovalue()); by vertex and
-     * lane */
+    /* at[n][vertex][lane]: x, y, z in tile space (n = 0, 1, 2), and the field minus the isovalue, scaled (n = 3,
+     * kernel_cell_subtract_isovalue()) */
     float at[4][8][SIMD_WIDTH];
-    /* By face and lane, a word with the indices, in the cell, of the vertices at the face's corners, four bits each,
-     * from bit 0 on. Quads are in the order of kernel_quad_corners(), triangles in the order of coordinates
-     * (kernel_triangle_order()). */
+    /* corners[face * SIMD_WIDTH + lane]: a word with the indices, in the cell, of the vertices at the face's corners,
+     * four bits each, from bit 0 on. Quads are in the order of kernel_quad_corners(), triangles in the order of
+     * coordinates (kernel_triangle_order()). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     /* The lines (kernel_line) of the edges of triangular faces. triangles[n] belongs to the n-th triangular face in the
      * list of faces of kernel_shape: the members c, cu, cv and bound, each for the edges ij, jk and ik, where i, j, k
      * are the triangle's corners in the order of coordinates. */
     float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
-    /* for each triangle, the least sum of weights at which its crossings are accurate
+    /* for each triangular face, the least sum of a crossing's weights at which the crossing is accurate
      * (kernel_compute_triangle_least_weight()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
@@ -84,7 +84,7 @@ SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int co
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
 }
 
-/* ---- order of vertices ---- */
+/* ---- canonical order of vertices ---- */
 
 SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_vertices *h, bool is_narrow, vm lanes, int i, int j)
 {
@@ -94,8 +94,8 @@ SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_vertices *h, bool is_na
     h->rank[j] = vf_select(lanes, was, h->rank[j]);
 }
 
-/* Computes each vertex's rank in the order of coordinates; vertices with equal coordinates are ranked in their given
- * order. */
+/* Computes each vertex's rank in the lexicographic order of coordinates. Vertices with equal coordinates are ranked in
+ * their given order. */
 SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);

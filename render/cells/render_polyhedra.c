@@ -168,7 +168,7 @@ static void read_faces(work *w, int64_t cell)
     for (int i = 0; i < c->entry_count; i++) c->entry_vertices[i] = w->rank[c->entry_vertices[i]];
 }
 
-/* ---- storing the result ---- */
+/* ---- storing the decomposed cell ---- */
 
 static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 {

@@ -31,7 +31,8 @@ typedef struct kernel_bundle {
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
-    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* the bundle's rays in tree space, used to test clips */
+    /* the same rays in scaled world coordinates (tree space of kernel_types.h), used to test clips */
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS];
 } kernel_bundle;
 
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)

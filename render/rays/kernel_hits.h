@@ -12,12 +12,13 @@ enum { KERNEL_MAX_CUTS = 32 };
 
 typedef struct kernel_hits {
     vm found;
-    /* A vector of any length along the gradient, in camera axes. With normals from vertices (RENDER_VERTEX) it holds
-     * the hit's reference coordinates in its cell until the tile ends. */
+    /* A vector of any length parallel to the field's gradient at the hit, in camera axes. If normals are interpolated
+     * from vertices (RENDER_VERTEX), this member holds the hit's reference coordinates in its cell instead, until the
+     * normal is computed at the end of the tile. */
     vf normal[3];
-    /* The cell that each ray has hit: index of the mesh part, and of the cell in the part; set only with normals from
-     * vertices (RENDER_VERTEX). Part -1: the hit's normal has been computed, or there is no hit, so that the cell is
-     * not needed. */
+    /* The cell that each ray has hit: index of the mesh part, and of the cell in the part; set only if normals are
+     * interpolated from vertices (RENDER_VERTEX). If `part` is -1, the cell is not needed, because the hit's normal has
+     * been computed or there is no hit. */
     vi part, cell;
     vf colour[3]; /* colour of each hit before lighting */
     /* distance from the hit, in scaled units, at which the field is sampled for central differences; set only if

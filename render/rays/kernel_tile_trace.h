@@ -27,8 +27,8 @@ typedef struct kernel_tile_trace {
     /* The clips of volumes may divide each ray into several intervals (kernel_clip.h). This is the index of the
      * interval in which volumes are being traced. */
     int clip_interval;
-    /* t at the eye's plane; while volumes are traced, least t of the window, the range of depths that is being
-     * traced */
+    /* least depth t that is being traced: that of the eye's plane or, while volumes are traced in several ranges of
+     * depths (windows), the least t of the current window */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */

@@ -74,14 +74,15 @@ enum {
     KERNEL_PIECE_CLEAR,        /* 1 - opacity at the lower end */
     KERNEL_PIECE_CLEAR_HIGH,
     KERNEL_PIECE_INVERSE, /* 1 / (high - low), the inverse width of the piece */
-    KERNEL_PIECE_SLOPE,   /* derivative of the opacity by the value */
+    KERNEL_PIECE_SLOPE,   /* derivative of the opacity with respect to the value */
     KERNEL_PIECE_COLOUR,
     KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
 };
 
 /* Bounds of a transfer function over a range of values in which the opacity has no step. Extinctions are per unit
- * distance (render_transfer). Slopes are derivatives by the value, in the function's domain (kernel_transfer). */
+ * distance (render_transfer). Slopes are derivatives with respect to the value, in the function's domain
+ * (kernel_transfer). */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;

@@ -57,7 +57,7 @@ hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const flo
     return out;
 }
 
-/* ---- the hemisphere ------------------------------------------------------------------------------------------ */
+/* ---- directions of rays into the hemisphere ---- */
 
 static double fractional_part(double x)
 {
