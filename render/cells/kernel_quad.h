@@ -108,12 +108,13 @@ static inline double kernel_scalar_discriminant(const kernel_scalar_quadratic *c
     return d > 0 ? d : 0;
 }
 
-/* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn` (plus or minus the square
- * root of the discriminant). There are two formulas for the root; the one in which digits do not cancel is used. */
-static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double turn)
+/* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `half_slope` (plus or minus the
+ * square root of the discriminant). There are two formulas for the root; the one in which digits do not cancel is used.
+ */
+static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double half_slope)
 {
-    const bool is_sum = c->c1 * turn <= 0;
-    const double n = is_sum ? turn - c->c1 : c->c0, d = is_sum ? n + c->c2 : c->c0 - c->c1 - turn;
+    const bool is_sum = c->c1 * half_slope <= 0;
+    const double n = is_sum ? half_slope - c->c1 : c->c0, d = is_sum ? n + c->c2 : c->c0 - c->c1 - half_slope;
     const double x = d != 0 ? n / d : is_sum;
     return x >= 0 ? fmin(x, 1) : 0;
 }

@@ -116,15 +116,15 @@ SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_nar
     /* vertex[b]: index of the hex's vertex whose reference coordinates x, y and z, each 0 or 1, are bits 0, 1 and 2 of
      * b */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
-    vm turn[3] = {vm_none(), vm_none(), vm_none()};
+    vm is_mirrored[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
         const vm least = vf_eq(h->rank[(int)vertex[b]], vf_set(0));
         for (int a = 0; a < 3; a++)
-            if (b >> a & 1) turn[a] = vm_or(turn[a], least);
+            if (b >> a & 1) is_mirrored[a] = vm_or(is_mirrored[a], least);
     }
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_sorted_curved_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
+            if (!(b >> a & 1)) kernel_sorted_curved_swap(h, is_narrow, is_mirrored[a], vertex[b], vertex[b | 1 << a]);
     for (int k = 0; k < 3; k++) {
         /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
         const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high);

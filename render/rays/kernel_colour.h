@@ -126,8 +126,8 @@ SIMD_INLINE void kernel_facing_normal(const kernel_packet *p, const vf n[3], vf 
         unit[a] = vf_select(flat, p->view[a], n[a] * inverse);
         facing += unit[a] * p->view[a];
     }
-    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
-    for (int a = 0; a < 3; a++) unit[a] *= turn;
+    const vf sign = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    for (int a = 0; a < 3; a++) unit[a] *= sign;
 }
 
 /* Shades a colour by the Blinn-Phong model (render.h). n: the gradient of the field at the hit, of any length and

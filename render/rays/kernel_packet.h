@@ -207,16 +207,16 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Restricts each of the packet's rays to the interval with the index `turn`, counted from 0, among the intervals that
+/* Restricts each of the packet's rays to the interval with the index `number`, counted from 0, among the intervals that
  * the clips of volumes leave of the ray. All surfaces must have been traced before. */
-static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
+static inline void kernel_packet_clip_volumes(kernel_packet *p, int number)
 {
-    if (turn == 0) {
+    if (number == 0) {
         p->all_active = p->active;
         p->surface_near = p->t_near;
         p->surface_far = p->t_far;
     }
-    kernel_packet_set_clip_interval(p, p->frame->job->volume_clips, turn);
+    kernel_packet_set_clip_interval(p, p->frame->job->volume_clips, number);
     p->t_near = vf_max(p->surface_near, p->clip_in);
     p->t_far = vf_min(p->surface_far, p->clip_out);
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
