@@ -1,6 +1,7 @@
 /* The colour tables are computed at first use. Some are copies of published tables (colour_tables.c). Those of
  * ColorBrewer are interpolated linearly in sRGB between the published colours, as matplotlib does. cool_to_warm is
- * Moreland's formula in Msh, the polar form of CIELAB; its middle is a neutral colour without a visible edge. */
+ * Moreland's formula in Msh, the polar form of CIELAB: it leads through a neutral colour in the middle, at which no
+ * edge is visible. */
 #include "colour_map.h"
 
 #include <pthread.h>

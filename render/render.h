@@ -16,8 +16,8 @@
  * sample of one of these cells, and marks the ray by a second fragment at the same depth. Compositing finds the pixels
  * in which fragments of any ranks overlap (comp.h), and these are traced again with separate_samples, which leaves the
  * sharing to compositing. Until then the result in such pixels is undefined. Volumes that are integrated by segments
- * work the same way: if cells overlap, each cell's segments become separate fragments; segments of several volumes do
- * so on all pixels.
+ * (RENDER_SEGMENTS) work the same way: where cells overlap, each cell's segments become separate fragments. Segments of
+ * several volumes become separate fragments on all pixels.
  *
  * Faces that coincide but whose coordinates or depths are not bit-identical, as at hanging nodes, leave overlaps and
  * gaps of the size of rounding. Segments whose overlap is that small are not reported to compositing: each has its own
@@ -95,8 +95,8 @@ typedef struct render_transfer {
     const float *colours; /* colour table: colour_count × 3 numbers, linear RGB */
     render_scale scale;
     double threshold; /* end of the linear part of RENDER_SYMLOG, > 0; unused by other scales */
-    /* For surfaces only: colours belong to bands of equal width and are not interpolated; colour_count may then be
-     * 1. */
+    /* For surfaces only: the range is divided into colour_count bands of equal width, each with one colour of the
+     * table; colours are not interpolated. colour_count may then be 1. */
     bool is_banded;
     /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. A value that is
      * outside the range by no more than the rounding error RENDER_END still counts as inside. NULL: values outside get
@@ -154,16 +154,17 @@ enum { RENDER_DIFFERENCE_SAMPLES = 6 };
  * bytes. */
 typedef struct render_pending_hit {
     uint32_t pixel, kind; /* pixel and kind of the fragment that will be made of the hit */
-    /* in scaled units: t: the ray's parameter at the hit; reach: distance from the hit to its six samples, which lie
-     * before and behind it along each world axis */
+    /* t: ray parameter at the hit; reach: distance from the hit to each of its six samples, which lie before and behind
+     * it along the three world axes; both in scaled units (render_space) */
     float t, reach;
 } render_pending_hit;
 
-/* Growing lists of pending hits and of the data for lighting them; both have `count` entries and are allocated by
- * memory.h. */
+/* A growing list of pending hits. items and shadings are arrays with `count` entries, one per hit, and with space for
+ * `capacity` entries; they are allocated by memory.h. */
 typedef struct render_pending_list {
     render_pending_hit *items;
-    /* per hit, the gradient in its own cell, in camera axes, and its unlit colour */
+    /* shadings[i][0]: gradient of the field in the cell of hit i, in camera axes; shadings[i][1]: unlit colour of hit
+     * i, linear RGB */
     float (*shadings)[2][3];
     int64_t count, capacity;
 } render_pending_list;
@@ -329,8 +330,8 @@ typedef struct render_job {
     /* NULL: normals by RENDER_DIFFERENCES are computed at once from this rank's cells. Otherwise such hits, except
      * those of polyhedra, are added to this list instead of becoming fragments. Not allowed with RENDER_VALUES. */
     render_pending_list *waiting;
-    /* used to light pending hits: the value range of each surface's field over all ranks (low > high if no rank has the
-     * field) */
+    /* used to light pending hits: for each surface layer, minimum and maximum of its field over all ranks; minimum >
+     * maximum if no rank has the field */
     double (*waiting_ranges)[2];
     render_traversal traversal;
     const render_volume_layer *volumes;
@@ -350,8 +351,8 @@ typedef struct render_job {
      * It must be the same on all ranks, so that all of them divide intervals into the same segments. 0: the bound for
      * this rank's cells is used. */
     double extent;
-    /* number of samples of a ray that are looked up together, 1 .. RENDER_MAX_GROUP: the N of the thesis's sample
-     * position packets (section 4.4.1) */
+    /* number of consecutive samples of a ray whose cells are searched for together, 1 .. RENDER_MAX_GROUP: the N of the
+     * thesis's sample position packets (section 4.4.1) */
     int sample_group;
     /* Set if a ray's first sample is displaced by a hash of pixel and frame, between 0 and 1 steps (render_jitter());
      * otherwise it is displaced by half a step. */
@@ -372,10 +373,11 @@ typedef struct render_job {
 } render_job;
 
 typedef struct render_statistics {
-    int64_t rays;         /* number of traced rays, one per pixel */
-    int64_t map_failures; /* number of points for which the inversion of a cell's map failed */
-    /* number of cells that were transformed for volumes; a cell counts once for each tile, and for each window (range
-     * of depths that a tile traces at a time) in it */
+    int64_t rays; /* number of traced rays, one per pixel */
+    /* number of points at which a cell's map from reference coordinates to positions could not be inverted */
+    int64_t map_failures;
+    /* number of cells that were transformed into tile space for volumes; a tile is traced in several ranges of depth
+     * (windows), and a cell counts once for each tile and window in which it is transformed */
     int64_t volume_cells;
     double surface_ms, volume_ms;
 } render_statistics;

@@ -5,8 +5,9 @@
  * differences are added to that list. The field is then sampled at six points around each hit, by this rank and by
  * every rank whose box contains one of the points. The samples are merged, and their differences give the normal with
  * which the hit is lit. Each rank computes the hit's pixel, tile and ray from the camera, which all ranks have, and
- * samples in the same tile space as the rank of the hit. So the result is bit-identical to that of one rank with all
- * cells. If several cells contain a point, on whichever ranks, the sample is the minimum of their values. */
+ * takes samples in the same coordinates (tile space, kernel_types.h) as the rank of the hit. So the result is
+ * bit-identical to that of one rank that has all cells. If several cells contain a point, on whichever ranks, the
+ * sample is the minimum of their values. */
 #ifndef RENDER_RENDER_DIFFERENCES_H
 #define RENDER_RENDER_DIFFERENCES_H
 
@@ -15,8 +16,8 @@
 #include "insitu/status.h"
 #include "render.h"
 
-/* Returns the bounding box of all cells on this rank in which a sample around a hit may lie, on whichever rank the hit
- * is. */
+/* Returns the bounding box of this rank's cells from which normals by differences may need samples. The hits to which
+ * these normals belong may be on any rank. */
 render_box render_differences_box(const render_job *job);
 
 /* Returns whether the job has surfaces whose hits may need samples of other ranks. */
@@ -26,8 +27,8 @@ bool render_has_differences(const render_job *job);
  * those over all ranks (render_job.waiting_ranges). */
 void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
 
-/* Sorts the hits by tile and block, so that hits of neighbouring pixels are adjacent, which only matters for speed.
- * Returns false and keeps the order if memory ran out. */
+/* Sorts the hits by tile (16 × 16 pixels) and by block of 4 × 4 pixels in it, so that hits of neighbouring pixels are
+ * adjacent in the list. The order only affects speed. Returns false and keeps the order if memory ran out. */
 bool render_differences_sort(const render_job *job, render_pending_list *list);
 
 /* Returns whether one of the six sample points of the hit may be in the box. */

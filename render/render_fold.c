@@ -49,8 +49,9 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
     starts[pixels] = count;
 }
 
-/* Sorts fragments by depth; they are nearly sorted already. The kind of a run's first fragment marks it as such. This
- * mark must not affect the order, so kinds are not compared. */
+/* Sorts a pixel's volume fragments by depth; they are nearly sorted already. Kinds are not compared: the kind only
+ * marks the first fragment of a run (a sequence without gaps, defined at the top of this file), and this mark must not
+ * affect the order. */
 static void sort(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
@@ -68,8 +69,8 @@ static void sort(fragment *items, int64_t count)
     }
 }
 
-/* Returns the error bound of a segment's end at t. If a segment of another rank begins or ends within this distance,
- * the two may be parts of touching cells. */
+/* Returns the error bound of a segment's end at t. If a segment of another rank begins or ends within this distance of
+ * t, the cells of the two segments may touch. */
 static float compute_segment_end_error(float t)
 {
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
@@ -83,8 +84,9 @@ static void shorten(const render_folding *folding, fragment *items, int64_t coun
         items[i].t_out -= compute_segment_end_error(items[i].t_out);
 }
 
-/* Folds the `count` fragments of one run, interval by interval (fragment_interval_number()). Stores the resulting
- * fragments at `out`, and returns the address behind the last one. */
+/* Blends the `count` fragments of one run (a sequence without gaps), separately in each interval of the ray
+ * (fragment_interval_number()). Stores the resulting fragments at `out`, and returns the address behind the last
+ * one. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

@@ -59,7 +59,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     render_folding_free(&fold);
 }
 
-/* ---- hits that need samples of other ranks ------------------------------------------------------------------- */
+/* ---- lists of hits that need samples of other ranks ------------------------------------------------------------ */
 
 static bool grow_list(render_pending_list *list, int64_t capacity)
 {
@@ -99,7 +99,7 @@ static void drop_placeholders(fragment_list *list, int64_t first)
     list->count = to - list->items;
 }
 
-/* ---- threads ------------------------------------------------------------------------------------------------- */
+/* ---- tracing with several threads ------------------------------------------------------------------------------ */
 
 bool render_reserve_fragments(fragment_list *list, int64_t more)
 {

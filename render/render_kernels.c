@@ -28,8 +28,9 @@
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-/* Sorts candidates by mesh part; within a part they stay in order of depth. Cells are traced in batches (up to
- * SIMD_WIDTH cells, kernel_batch.h) of one part only, and without sorting, cells of different parts would alternate. */
+/* Sorts candidates by mesh part; within a part they stay in order of depth. Up to SIMD_WIDTH cells are traced together
+ * (kernel_batch.h), but only cells of one part. Without sorting, cells of different parts would alternate, and few
+ * cells would be traced together. */
 static void kernel_sort_candidates_by_part(const kernel_tile_candidate **items, int count)
 {
     for (int n = 1; n < count; n++) {
@@ -41,7 +42,7 @@ static void kernel_sort_candidates_by_part(const kernel_tile_candidate **items, 
     }
 }
 
-/* Queues the cells in m->prefetched, whose connectivity has been prefetched, for tracing. */
+/* Adds the cells in m->prefetched, whose connectivity has been prefetched, to the queues of cells to be traced. */
 static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
@@ -148,7 +149,8 @@ static void trace_tile_volumes(kernel_tile_trace *t)
     t->thread->volume_seconds += render_seconds() - start;
 }
 
-/* Returns whether the tile overlaps the rectangle of pixels in which some tree may be visible (kernel_frame.cover). */
+/* Returns whether the tile overlaps the rectangle of pixels in which a tree's bounding box may be visible
+ * (kernel_frame.cover). */
 static bool is_covered(const kernel_frame *f, int x0, int y0)
 {
     return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&

@@ -20,7 +20,7 @@
 #include "render_prepare.h"
 #include "render_thread.h"
 
-/* ---- one hit ------------------------------------------------------------------------------------------------- */
+/* ---- the rays of a hit ---------------------------------------------------------------------------------------- */
 
 static hit_frame place_of(const render_job *job, const render_hit *hit)
 {
@@ -63,13 +63,14 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
     hit_directions(job, hit->pixel, (const double(*)[3])p.axes, directions);
 }
 
-/* ---- tracing ------------------------------------------------------------------------------------------------- */
+/* ---- tracing rays from hits ----------------------------------------------------------------------------------- */
 
 /* CHUNK_HITS: number of hits that a thread processes together; cells that it has read for one of these hits are cached
  * for the others. CHUNK_RAYS: maximum number of their rays. */
 enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
-/* Number of tiles per scaled unit, along each axis, in the plane across a light's direction. */
+/* Rays towards a light are grouped into tiles, squares in the plane perpendicular to the light's direction. This is the
+ * number of tiles per scaled unit along each axis of that plane. */
 enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
@@ -80,12 +81,12 @@ struct render_occluders {
     int threads;
 };
 
-/* The state of a thread that traces rays from hits. Each thread has its own copy of the frame and the job, because each
- * tile space has a different camera. */
+/* The state of a thread that traces rays from hits. Each thread has its own copies of the frame and the job. Their
+ * camera is replaced whenever rays are traced in another tile space (kernel_bundle.h). */
 typedef struct tracer {
     const render_occluders *of;
     const render_job *job; /* the job from which the occluders were collected */
-    render_job moved_job;  /* the job with the camera of the current tile space, used by `frame` */
+    render_job moved_job;  /* copy of the job with the camera of the current tile space; frame.job points to it */
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
@@ -103,7 +104,7 @@ bool render_grow_undecided(kernel_secondary_rays *s)
     return true;
 }
 
-/* ---- tracing single rays */
+/* ---- the list of a chunk's rays, which are tested in tree space */
 
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
@@ -135,7 +136,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
     }
 }
 
-/* ---- rays that must be tested exactly in a cell */
+/* ---- rays that are traced exactly in a cell, because simpler tests have not decided */
 
 static void tracer_set_tile_space(tracer *t, const double eye[3], const double (*axes)[3], bool is_orthographic)
 {
@@ -149,7 +150,8 @@ static void tracer_set_tile_space(tracer *t, const double eye[3], const double (
         for (int k = 0; k < 3; k++) t->frame.scaled_axes[a][k] = axes[a][k] * t->moved_job.space.scale;
 }
 
-/* Fills the bundle with the rays of a hit's hemisphere, and sets the tile space to theirs. */
+/* Fills the bundle with the rays of a hit's hemisphere, and sets the camera to that of their tile space, in which they
+ * are traced (kernel_bundle.h). */
 static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
@@ -176,7 +178,8 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
     b->count = o->samples;
 }
 
-/* Fills the bundle with a hit's ray to a light, and sets the tile space to that of the ray. */
+/* Fills the bundle with a hit's ray to a light, and sets the camera to that of the ray's tile space, in which it is
+ * traced (kernel_bundle.h). */
 static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const render_space *space = &t->job->space;
@@ -216,12 +219,12 @@ static void test_cell(tracer *t, int32_t occluder)
     t->of->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Replaces the occluder's index in an undecided ray-cell pair when that cell has been tested with all rays of the hit
- * for which it was undecided. */
+/* Value of kernel_undecided_pair.occluder that marks a pair as tested: when a cell is tested, all of the hit's rays
+ * that are undecided in this cell are tested at once. */
 enum { TESTED = -1 };
 
-/* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided ray-cell pairs, and clears
- * is_open of the rays that are blocked. */
+/* Tests a hit's rays into the hemisphere exactly: `undecided` has `count` pairs of a ray and a cell that may block it.
+ * Clears is_open of the rays that are blocked. */
 static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_pair *undecided, int64_t count)
 {
     uint64_t open = 0;
@@ -300,7 +303,7 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     }
 }
 
-/* ---- threads */
+/* ---- one tracer per thread */
 
 static tracer *tracer_create(const render_occluders *of)
 {
@@ -386,7 +389,7 @@ insitu_status render_occlude(const render_occluders *of, const render_hit *hits,
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the rays of %lld hits", (long long)count);
 }
 
-/* ---- ranks whose cells rays may meet ------------------------------------------------------------------------- */
+/* ---- which ranks' bounding boxes a hit's rays meet ------------------------------------------------------------ */
 
 static bool is_opaque(const render_surface_layer *layer)
 {
@@ -455,7 +458,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
     }
 }
 
-/* ---- colours ------------------------------------------------------------------------------------------------- */
+/* ---- lighting of fragments ------------------------------------------------------------------------------------ */
 
 /* Computes the factors of the diffuse and specular light of a hit as kernel_shade() does, but in double and only from
  * the lights whose bits are set in `lights`. */

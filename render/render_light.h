@@ -33,15 +33,15 @@ typedef struct render_hit {
     float t, normal[2];
 } render_hit;
 
-/* The open rays of a hit. samples: one bit for each ray into the hemisphere; lights: one bit for each ray towards a
- * light of the job. A bit is set as long as the ray is open. */
+/* The open rays of a hit: those that no surface found so far blocks. samples: bit k stands for ray k into the
+ * hemisphere; lights: bit i stands for the ray towards light i of the job. The bits of open rays are set. */
 typedef struct render_hit_rays {
     uint64_t samples;
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* Computes the hit of an unlit fragment of the job, and marks all rays that the hit has as open. Returns false if the
- * fragment needs no rays to be lit. */
+/* Computes the hit of an unlit fragment of the job, and sets the bits in *rays of all rays that the hit has. Returns
+ * false if the fragment needs no rays to be lit. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
 /* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its rays into the
@@ -52,8 +52,8 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 /* This rank's occluders: the cells that contain an opaque surface, which may block rays of the job's hits. */
 typedef struct render_occluders render_occluders;
 
-/* Collects the occluders once for all hits of a frame. The job must not change until they are freed, except for its
- * occlusion and camera. On success *out is NULL if there are none. Local. */
+/* Collects the occluders once for all hits of a frame. Until they are freed, the job must not change, except for its
+ * occlusion and camera. On success *out is NULL if there are no occluders. Local. */
 insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
 void render_occluders_free(render_occluders *occluders);
 
@@ -71,8 +71,8 @@ typedef void render_box_callback(void *state, int box, const render_hit_rays *ra
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
                           const render_box *boxes, int count, render_box_callback *take, void *state);
 
-/* Lights an unlit fragment by the rays in *open. If all rays are open, the result is the fragment that RENDER_LIGHT
- * would have given. Fragments of volumes are left unchanged. */
+/* Lights an unlit fragment, whose rays in *open no surface blocks. If all rays are open, the result is the fragment
+ * that RENDER_LIGHT would have given. Fragments of volumes are left unchanged. */
 void render_light_fragment(const render_job *job, const render_hit_rays *open, fragment *f);
 
 #endif

@@ -154,8 +154,8 @@ void render_surface_range(const render_job *job, int surface, double range[2])
     }
 }
 
-/* Returns 1 / the width of the range of a surface's field, rounded to a power of two. The range is that on all ranks if
- * normals by differences use samples of other ranks (job->waiting), otherwise that on this rank. */
+/* Returns 1 / the width of the range of a surface's field, rounded to a power of two. The range is taken over all ranks
+ * if normals by differences use samples of other ranks (job->waiting is set), otherwise over this rank. */
 static double value_scale(const render_job *job, int surface)
 {
     double range[2];
@@ -167,8 +167,9 @@ static double value_scale(const render_job *job, int surface)
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Sets common_clips to the clips that belong to all layers and leave a single interval of a ray. Sets volume_intervals
- * to the largest number of intervals that the clips of volumes can leave of a ray. */
+/* Sets f->common_clips to the clips that cut all layers and leave at most one interval of a ray: those that keep the
+ * inside of a half space, box or sphere. Sets f->volume_intervals to the largest number of intervals that the clips of
+ * volumes can leave of a ray. */
 static void prepare_clips(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -300,9 +301,9 @@ static double longest_ray_in_scene(const render_job *job)
     return sqrt(square);
 }
 
-/* If max_error is smaller than this, the ends of rays' intervals in tets are computed in double
- * (kernel_frame.is_double). The largest error measured with float32, over random tets and functions with steps and
- * opacities up to 1, was 3.4e-5. */
+/* If the job's max_error (error bound of a colour) is smaller than this, the ends of rays' intervals in tets are
+ * computed in double (kernel_frame.is_double). The largest error measured with float32, over random tets and functions
+ * with steps and opacities up to 1, was 3.4e-5. */
 static const double double_error = 2e-4;
 
 /* Returns whether the job may have hexes, wedges or pyramids, whose segments are computed in lanes
@@ -332,9 +333,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * error_of_each);
-    /* A segment is cut at a surface either by this rank or by compositing. Which of them cuts it depends on the
-     * partition, because a rank finds overlaps that lie clearly in front of the surface only among its own cells. Both
-     * must give the same result, to 1e-6. Segments of several volumes are always cut by compositing. */
+    /* A segment is cut at a surface either by this rank or by compositing, depending on the partition: a rank finds
+     * overlaps that lie clearly in front of the surface only among its own cells. Both cuts must give the same result,
+     * to 1e-6. Segments of several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : longest_ray_in_scene(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {

@@ -6,10 +6,12 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Converts a candidate of the picture to one of the tile whose upper left pixel is (x0, y0). */
+/* Converts a candidate (a cell that may be visible in some pixels of the picture) to its form in the bin of one tile,
+ * with pixels counted from (x0, y0), the tile's upper left pixel. */
 static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, int x0, int y0)
 {
-    /* first and last column, first and last row of the cell's pixels in the tile */
+    /* first and last column, first and last row of the cell's pixels in the tile, counted from the tile's upper left
+     * pixel */
     const int ends[4] = {c->x0 > x0 ? c->x0 - x0 : 0, c->x1 - x0 < KERNEL_TILE - 1 ? c->x1 - x0 : KERNEL_TILE - 1,
                          c->y0 > y0 ? c->y0 - y0 : 0, c->y1 - y0 < KERNEL_TILE - 1 ? c->y1 - y0 : KERNEL_TILE - 1};
     unsigned blocks[2]; /* masks of the columns and of the rows of blocks that contain one of the pixels */

@@ -49,17 +49,19 @@ typedef struct kernel_curved_lanes {
     /* at: vertex positions relative to the eye, in scaled units along the camera's axes; f: vertex values minus the
      * isovalue, scaled as by kernel_cell_subtract_isovalue() */
     vf at[8][3], f[8];
-    /* lanes in which positions and values are not NaN and neither too large nor too small for computations in float32;
-     * the cells of other lanes are tested one by one */
+    /* lanes in which no position or value is NaN, or too large or too small for computations in float32; the cells of
+     * other lanes are tested one by one */
     vm fitting_lanes;
-    /* level: the linear function L (the top of this file) at the vertices; thickness: the isosurface lies in the slab
-     * |L| <= thickness; infinite if no slab is known. Not set for tets. */
+    /* level: value at each vertex of the linear function L that approximates f (the top of this file); thickness: the
+     * isosurface lies in the slab |L| <= thickness, between two parallel planes; infinite if no slab is known. Not set
+     * for tets. */
     vf level[8], thickness;
 } kernel_curved_lanes;
 
-/* Returns the lanes whose cells' maps are not folded. terms: the polynomial coefficients of the three coordinates
- * (kernel_local.h); inverse: the inverse of the matrix of their linear terms. The square of the Frobenius norm (see the
- * top of this file) must be below 0.9 instead of 1, which leaves a margin far larger than all rounding errors. */
+/* Returns the lanes in which the cell's map from reference coordinates to positions is certainly one-to-one (not
+ * folded). terms: the polynomial coefficients of the three coordinates (kernel_local.h); inverse: the inverse of the
+ * matrix of their linear terms. The square of the Frobenius norm (see the top of this file) must be below 0.9 instead
+ * of 1, which leaves a margin far larger than all rounding errors. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
 {
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
@@ -70,10 +72,10 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], cons
     return vf_lt(kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
 }
 
-/* Computes the members level and thickness, which define the slab that contains the isosurface. |f| is at most about 1.
- * Let r be the rounding error of one coordinate. Each coordinate of a vertex has an error of at most r, and that of the
- * average of the vertices (terms[a][0]) has an error of at most 8 r. Lanes in which the cell's volume is near float32's
- * minimum are removed from fitting_lanes. */
+/* Computes the members level and thickness, which define the slab (the space between two parallel planes) that contains
+ * the isosurface. |f| is at most about 1. Let r be the rounding error of one coordinate. Each coordinate of a vertex
+ * has an error of at most r, and each coordinate of the vertices' average (terms[a][0]) an error of at most 8 r. Lanes
+ * in which the cell's volume is near float32's minimum are removed from fitting_lanes. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
 {
     const int count = grid_type_vertices(type);
@@ -112,9 +114,9 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
     KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
 }
 
-/* Computes the bounds, in the picture and in depth, of that part of the cell's convex hull that lies in the slab. The
- * part's corners are among the vertices that lie in the slab and the points at which lines between two vertices cross
- * the slab's two planes. */
+/* Computes the bounds, in the picture and in depth, of that part of the cell's convex hull that lies in the slab |L| <=
+ * thickness, which contains the isosurface. The part's corners are among the vertices that lie in the slab and the
+ * points at which lines between two vertices cross the slab's two planes. */
 static __attribute__((noinline)) void
 kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
@@ -151,9 +153,9 @@ SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kern
     }
 }
 
-/* Computes l->at and l->fitting_lanes for hexes of a uniform or rectilinear lattice. The result is bit-identical to
- * that of kernel_curved_lanes_transform(), but each product is computed once for all vertices that share a
- * coordinate. */
+/* Computes l->at and l->fitting_lanes for hexes of a uniform or rectilinear grid. The result is bit-identical to that
+ * of kernel_curved_lanes_transform(). It is computed faster, because each product is computed once for all vertices
+ * that share a coordinate. */
 static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kernel_finder *s, const kernel_cells *c,
                                                                      kernel_curved_lanes *l)
 {
@@ -232,8 +234,8 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
 
 /* ---- tets ---- */
 
-/* Finds the tets that isovalues cross. All tets of a leaf are transformed at once, because if one of them is crossed,
- * most are. */
+/* Adds those tets of the list to the candidates that isovalues of the layer cross. All tets of the list are transformed
+ * before they are tested, because if one tet of a leaf is crossed, most of its tets are. */
 static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
 {
     const unsigned all = (1u << c->count) - 1;
@@ -262,8 +264,8 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the cells of the list to the candidates, with the bounds of the isosurface in them. All cells must be crossed by
- * the layer's isovalue with the index c->value. */
+/* Computes the bounds of the isosurface in each cell of the list, and adds the cells to the candidates. The layer's
+ * isovalue with the index c->value must cross all of these cells. */
 SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);

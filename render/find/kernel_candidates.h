@@ -69,8 +69,8 @@ static __attribute__((noinline)) void kernel_find_volume_cells(kernel_finder *s,
 
 /* ---- cells ---- */
 
-/* Tests the cells of a list of pending cells, adds those that may be visible to the candidates (or to s->crossed), and
- * empties the list. */
+/* Tests the cells of a list of s->pending, and empties the list. Cells that may be visible become candidates; hexes,
+ * wedges and pyramids that an isovalue crosses are first added to the lists s->crossed. */
 static void kernel_process_pending_cells(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -142,8 +142,8 @@ static void kernel_process_all_queued_cells(kernel_finder *s)
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_process_crossed_cells(s, &s->crossed[i]);
 }
 
-/* KERNEL_FRONT: number of nodes that are tested together, so that the memory accesses of their prefetches overlap.
- * KERNEL_FRONT_ROOM: number of entries of the stack. */
+/* KERNEL_FRONT: number of nodes that are taken from the stack and tested together, so that the memory accesses of their
+ * prefetches overlap. KERNEL_FRONT_ROOM: size of the stack, apart from a reserve of 2 * KERNEL_FRONT entries. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
 /* Returns whether the node's box may be visible in the picture. On entry, *is_inside states whether the parent's whole
@@ -160,8 +160,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
 }
 
 /* Keeps those entries whose nodes have visible values and a box that may be visible in the picture, and returns their
- * number. An entry is 2 * node, plus 1 if the node lies completely in the picture. The test of values has no branch,
- * because it rejects about half of the entries unpredictably. */
+ * number. An entry is 2 * node, plus 1 if the node's whole box lies in the picture. Values are tested without a branch,
+ * because about half of the entries are rejected, which a processor could not predict. */
 SIMD_INLINE int kernel_front_keep_visible(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                           int64_t entries[KERNEL_FRONT], int count)
 {

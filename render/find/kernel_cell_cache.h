@@ -1,4 +1,4 @@
-/* Caches the cells that single packets have fetched, while their tile is traced. */
+/* Caches cells that have been fetched from the mesh for a packet of rays, for the other packets of the same tile. */
 #ifndef RENDER_KERNEL_CELL_CACHE_H
 #define RENDER_KERNEL_CELL_CACHE_H
 

@@ -24,7 +24,8 @@
 typedef struct kernel_cells {
     int type, vertices; /* cell type (grid.h), and number of vertices of each cell */
     int count;
-    /* for cells that an isovalue crosses: index of this isovalue in the layer, the same for all cells of the list */
+    /* index in the layer of the isovalue that crosses all cells of the list; used only by the lists in
+     * kernel_finder.crossed */
     int value;
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
@@ -66,7 +67,8 @@ typedef struct kernel_finder {
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source; /* kernel_candidate.source for the first isovalue of the layer, or for the volume */
+    /* value of kernel_candidate.source for candidates of the layer's first isovalue, or of the volume */
+    uint32_t source;
     kernel_planes planes;
     float t_near; /* ray parameter t at the eye's plane */
     /* column_scale, row_scale: number of pixels per unit of slope (per scaled unit if the camera is orthographic);
@@ -140,8 +142,8 @@ SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf o
     }
 }
 
-/* Returns those of the lanes in `fitting` in which the coordinates are not NaN and not too large for computations in
- * float32. The cells of all other lanes are tested one by one. */
+/* Returns those of the lanes in `fitting` in which no coordinate is NaN or too large for computations in float32. The
+ * cells of all other lanes are tested one by one. */
 SIMD_INLINE vm kernel_positions_fit_lanes(vm fitting, const vf place[3])
 {
     for (int a = 0; a < 3; a++) fitting = vm_and(fitting, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
@@ -179,9 +181,10 @@ SIMD_INLINE kernel_view_bounds kernel_view_bounds_empty(void)
 }
 
 /* Computes the first and the last column (or row) of pixels between each lane's bounds low and high, clipped to the
- * range from ends[0] to ends[1]. zero: the column (or row) at which `low` and `high` are 0; error_bound: error of `low`
- * and `high`, in pixels. The bounds are widened by error_bound, by 1/100 pixel and by 3e-5 of their magnitude and that
- * of `zero`, so that rays that hit the cell only by rounding are included. Returns the lanes that contain a pixel. */
+ * range from ends[0] to ends[1]. zero: the column (or row) from which `low` and `high` are counted; error_bound: upper
+ * bound of the errors of `low` and `high`, in pixels. The range is widened by error_bound, by 1/100 pixel and by 3e-5
+ * of the magnitudes of low, high and zero, so that rays that hit the cell only by rounding are included. Returns the
+ * lanes that contain a pixel. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
                                   vf *last)
 {
@@ -204,7 +207,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* One error bound is used for all lanes, the largest one. */
+    /* the largest error bound of a lane, used for all lanes */
     const float error_bound = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
     vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, error_bound * fabsf(s->column_scale), columns,
@@ -238,7 +241,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
 
 /* ---- cells that are tested one by one ---- */
 
-/* Extends the bounds, equally in all lanes, so that they contain a vertex of the mesh. */
+/* Extends the bounds in all lanes so that they contain a vertex of the mesh; all lanes stand for one cell. */
 SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t vertex, kernel_view_bounds *e)
 {
     const double *eye = s->frame->job->camera.eye;

@@ -6,8 +6,8 @@
 #include "kernel_arrays.h"
 #include "simd.h"
 
-/* Prefetches a cell's vertex indices and its type. The cell's offset into the connectivity has not been prefetched, so
- * this function may have to wait for it. */
+/* Prefetches a cell's vertex indices and its type. To find the indices, it reads the cell's offset into the
+ * connectivity array, which has not been prefetched, so that it may wait for memory. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;

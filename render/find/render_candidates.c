@@ -22,10 +22,10 @@
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
 /* SMALL_CELLS and SMALL_CROSSED are limits for the number of cells per pixel that the trees' bounding boxes cover in
- * the picture. If there are more cells, they count as small, and tiles traverse the trees themselves. SMALL_CELLS: for
- * volumes. SMALL_CROSSED: for surfaces; only cells in tree leaves whose range of values contains an isovalue are
- * counted (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which the number of these cells is
- * estimated. */
+ * the picture. If there are more cells per pixel, the cells count as small, and tiles traverse the trees themselves.
+ * SMALL_CELLS: for volumes. SMALL_CROSSED: for surfaces; only cells in tree leaves whose range of values contains an
+ * isovalue are counted (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which the number of
+ * these cells is estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- lists of candidates -------------------------------------------------------------------------------------- */
@@ -115,8 +115,8 @@ static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, in
     bin_tiles(bin->list.chunk, across, starts + 1, NULL);
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        /* the second call of bin_tiles() increases this index from that of the tile's first candidate to that of the
-         * next tile's */
+        /* index of the tile's first candidate; the second call of bin_tiles() increases it to that of the next tile's
+         * first candidate */
         starts[1 + tile] = (uint32_t)sum;
         sum += count;
     }
@@ -173,10 +173,11 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
     return gather(frame->candidates, tile, &thread->bin) && gather(frame->volume_candidates, tile, &thread->volume_bin);
 }
 
-/* ---- positions of cells in the picture ---------------------------------------------------------------------- */
+/* ---- numbers of cells per pixel, and bounding boxes in the picture -------------------------------------------- */
 
-/* Extends the ranges of columns (spans[0], low and high) and of rows (spans[1]) of pixels so that they contain a point,
- * which is given in tree space. Returns the point's depth from the eye, or 1 if the camera is orthographic. */
+/* Extends the ranges of pixel columns (from spans[0][0] to spans[0][1]) and of rows (spans[1]) so that they contain a
+ * point, which is given in the trees' coordinates. Returns the point's depth from the eye, or 1 if the camera is
+ * orthographic. */
 static double widen(const kernel_frame *f, const double point[3], double spans[2][2])
 {
     const render_camera *c = &f->job->camera;
@@ -212,10 +213,10 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spa
     return least;
 }
 
-/* Measures the parts on which the field exists (ranges[part].low is set), or all parts if ranges is NULL. *cells:
- * number of their cells; *pixels: sum of the areas of their bounding boxes in the picture, in pixels; all: ranges of
- * columns and rows that the boxes together cover. Returns false if a part does not lie completely in front of the
- * eye. */
+/* Measures the mesh parts on which the field exists (ranges[part].low is set), or all parts if ranges is NULL. *cells:
+ * number of these parts' cells; *pixels: sum of the areas of their bounding boxes in the picture, in pixels; all:
+ * ranges of columns and rows that these boxes together cover. Returns false if a part does not lie completely in front
+ * of the eye. */
 static bool measure_parts_in_picture(const kernel_frame *f, const mmbvh_ranges *ranges, double *cells, double *pixels,
                                      double all[2][2])
 {
@@ -318,7 +319,7 @@ void render_trees_cover(kernel_frame *f)
     }
 }
 
-/* ---- the search ----------------------------------------------------------------------------------------------- */
+/* ---- parallel search for candidates --------------------------------------------------------------------------- */
 
 /* Searches all subtrees in parallel. As soon as no subtree is left, each thread sorts its own candidates by tile,
  * without waiting for the other threads. most: maximum number of candidates that a thread may store in its bins; a
@@ -344,8 +345,8 @@ static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64
     }
 }
 
-/* Creates each thread's list and bins. bound: number of candidates that the lists may contain. Returns NULL if there is
- * no memory. */
+/* Creates each thread's list and bins. *bound: number of candidates that the lists of all threads together may contain.
+ * Returns NULL if there is no memory. */
 static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound, int threads)
 {
     struct kernel_bins *bins = base_calloc((size_t)threads, sizeof *bins);

@@ -17,10 +17,10 @@ void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int t
  * small or too many, or memory runs out, frame->volume_candidates stays NULL, and tiles traverse the tree
  * themselves. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* Gathers the candidates of the tile whose upper left pixel is (x0, y0), from the bins of all threads, in thread->bin
- * (surfaces) and thread->volume_bin. Returns false if there is no memory. */
+/* Collects the candidates of the tile whose upper left pixel is (x0, y0) from the bins of all threads: those of
+ * surfaces in thread->bin, those of the volume in thread->volume_bin. Returns false if there is no memory. */
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
-/* Sets frame->cover to the rectangle of pixels in which the bounding box of some tree may be visible. */
+/* Sets frame->cover to a rectangle of pixels outside which no tree's bounding box is visible. */
 void render_trees_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);
 
