@@ -7,8 +7,8 @@
  *     open              not known to be blocked
  *     slab              space between two parallel planes that contains the surface in a cell: |L| <= thickness, where
  *                       L is a linear function fitted to the field minus the isovalue (render_occluders.c)
- *     record            numbers that are stored for a hex in advance, from which the points are computed at which a
- *                       ray crosses the hex's faces
+ *     record            a hex's vertices, values and faces, stored in advance; from them a ray's crossings of the faces
+ *                       are computed
  *     undecided pair    a ray and a cell for which neither slab nor record decides; the ray is traced in the cell
  *
  * Once per frame occluders are put into trees of their own, whose nodes have as many children as a vector has lanes.
@@ -68,7 +68,8 @@ enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
 /* An occluder: a cell that an opaque isosurface crosses, and the isovalue. */
 typedef struct kernel_occluder {
-    /* index of the surface in the frame, of the isovalue in the surface's layer, and of the mesh part */
+    /* indices: of the surface among the frame's surfaces, of the isovalue in the surface's layer, and of the mesh
+     * part */
     int32_t surface, value, part;
     uint32_t cell;
     int32_t record; /* index of the cell's record in kernel_occluders.hexes; -1 if it has none */
@@ -77,9 +78,13 @@ typedef struct kernel_occluder {
 /* A tree whose nodes have one child per lane. Lanes without a child have an empty box. */
 typedef struct kernel_occluder_tree {
     int32_t node_count, leaf_count; /* number of nodes and number of leaves; both are 0 if the tree is empty */
-    float *boxes;                   /* boxes of the nodes' children: per node 6 rows of lanes, lower and upper corner */
-    int32_t *children;              /* per node and lane: the index of a child node, or ~index of a leaf */
-    float *leaves;                  /* the rows of all leaves */
+    /* bounding boxes of the nodes' children: per node 6 rows of one float per lane (x, y, z of the lower corner, then
+     * of the upper) */
+    float *boxes;
+    int32_t *children; /* per node and lane: the index of a child node, or ~index of a leaf */
+    /* the rows of all leaves, leaf after leaf: KERNEL_TRIANGLE_ROWS or KERNEL_SLAB_ROWS rows of one float per lane
+     * each */
+    float *leaves;
     /* per leaf and lane: index of the triangle's surface in the frame, or index of the slab's cell in
      * kernel_occluders.cells; -1 if the lane is empty */
     int32_t *sources;
@@ -104,8 +109,8 @@ typedef struct kernel_secondary_ray {
     int16_t hit, number;
 } kernel_secondary_ray;
 
-/* A ray and an occluder in whose cell the ray must be traced; indices into kernel_secondary_rays.rays and
- * kernel_occluders.cells. */
+/* A ray and a cell in which it must be traced, because simpler tests have not decided whether the cell blocks it. ray:
+ * index in kernel_secondary_rays.rays; occluder: index in kernel_occluders.cells. */
 typedef struct kernel_undecided_pair {
     int32_t ray, occluder;
 } kernel_undecided_pair;
@@ -114,7 +119,8 @@ typedef struct kernel_secondary_rays {
     int count;
     kernel_secondary_ray *rays;
     int64_t undecided_count, capacity;
-    kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
+    /* undecided pairs: slab and record do not decide whether the cell blocks the ray */
+    kernel_undecided_pair *undecided;
 } kernel_secondary_rays;
 
 /* Enlarges the list of undecided pairs; returns false if memory ran out. */
@@ -124,16 +130,19 @@ bool render_grow_undecided(kernel_secondary_rays *s);
 
 typedef struct kernel_prepared_ray {
     const kernel_secondary_ray *ray;
-    /* The ray meets the plane at position x along an axis at the distance x * inverse + shift. The shifts for a box's
-     * near and far planes differ, so that boxes are extended by more than the rounding error. */
+    /* Per axis: the ray meets the plane with the coordinate x on this axis at the distance x * inverse + shift along
+     * the ray. The shifts for a box's near and far planes differ, so that boxes are extended by more than the rounding
+     * error. */
     vf inverse[3], near_shift[3], far_shift[3];
     /* Offsets, in floats, into the six rows of a node's boxes. near_row: per axis, offset of the row with those planes
      * of the boxes that the ray meets first; far_row: offset of the row with the opposite planes. */
     int near_row[3], far_row[3];
-    int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
+    int kx, ky, kz; /* kz: the axis with the direction's largest component; kx, ky: the next two axes in cyclic order */
     /* with d the ray's direction: d[kx] / d[kz], d[ky] / d[kz] and 1 / d[kz] */
     float shear_x, shear_y, stretch;
-    float size; /* upper bound of positions' magnitudes, from which the rounding error of the slabs' L is computed */
+    /* upper bound of the magnitude of positions, to which the rounding errors of the slabs' linear functions are
+     * proportional */
+    float size;
 } kernel_prepared_ray;
 
 SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kernel_prepared_ray *p)
@@ -169,8 +178,9 @@ SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, floa
     kernel_prepared_ray_axes(ray, p);
 }
 
-/* Returns a mask of the boxes that the ray meets, one box per lane. rows: six rows of lanes with the boxes' lower and
- * upper corners. *low and *high become the distances along the ray at which it enters and leaves the boxes. */
+/* Returns a mask of the boxes that the ray meets, one box per lane. rows: six rows of one float per lane, x, y, z of
+ * the boxes' lower corners and of their upper corners. *low and *high become the distances along the ray at which it
+ * enters and leaves the boxes. */
 SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);

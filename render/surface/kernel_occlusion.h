@@ -29,14 +29,14 @@
 typedef struct kernel_occlusion {
     const kernel_surface *surface;
     const kernel_bundle *bundle;
-    int first; /* index, in the bundle, of the packet's first ray */
+    int first; /* index in bundle->rays of the packet's first ray */
     /* world coordinates of the vertices of the cell in which the rays are traced */
     double (*world)[3];
     int vertex_count;
 } kernel_occlusion;
 
-/* Returns the rays whose root at depth t may block them: its distance from the hit is at least the layer's `contact`
- * times the cell's size. */
+/* Returns the rays whose crossing of the isovalue at depth t may block them, because its distance from the ray's hit is
+ * at least the layer's `contact` times the cell's size. */
 static __attribute__((noinline)) vm kernel_occlusion_is_beyond_contact(const kernel_packet *p,
                                                                        const kernel_occlusion *o, vf t)
 {
@@ -46,7 +46,7 @@ static __attribute__((noinline)) vm kernel_occlusion_is_beyond_contact(const ker
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
 }
 
-/* Returns the rays of `hit` whose root at depth t all clips of the layer keep. */
+/* Returns those of the rays in `hit` whose crossing of the isovalue at depth t all clips of the layer keep. */
 static __attribute__((noinline, cold)) vm kernel_occlusion_kept_by_clips(const kernel_packet *p,
                                                                          const kernel_occlusion *o, vm hit, vf t)
 {
@@ -62,8 +62,8 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_kept_by_clips(const k
     return vm_from_bits(kept);
 }
 
-/* Makes the rays inactive whose roots at depth t block them, and returns these rays. found: rays that have a root at t.
- */
+/* Removes the rays that their roots at depth t block from the packet's active rays, and returns them. found: rays that
+ * have a root of the field minus the isovalue at t. */
 SIMD_INLINE vm kernel_deactivate_blocked_rays(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
@@ -75,7 +75,8 @@ SIMD_INLINE vm kernel_deactivate_blocked_rays(kernel_packet *p, const kernel_occ
     return hit;
 }
 
-/* Finds the roots in the rays' interval i one after the other, until each ray is blocked or has no more roots. */
+/* Finds the points in the rays' interval i at which the field is the isovalue, one after the other, until each ray is
+ * blocked or has no more such points. */
 SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
                                         const kernel_interval *i, vm wanted)
 {
@@ -90,7 +91,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
     } while (kernel_search_continue(&s));
 }
 
-/* Makes the rays inactive that the surface in a hex, wedge or pyramid blocks. */
+/* Removes the rays that the surface in a hex, wedge or pyramid blocks from the packet's active rays. */
 static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, const kernel_occlusion *o,
                                                               const kernel_cell *c, vm rays)
 {
@@ -112,8 +113,9 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     }
 }
 
-/* Makes the rays inactive that are blocked in their current interval (r->interval) in a polyhedron. For that, it
- * follows each ray's profile, the piecewise linear field along the ray (kernel_polyhedron_surface.h). */
+/* Removes the rays that are blocked in their current interval (r->interval) in a polyhedron from the packet's active
+ * rays. Crossings of the isovalue are found along each ray's profile, the piecewise linear field on the ray
+ * (kernel_polyhedron_surface.h). */
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
@@ -137,8 +139,9 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     }
 }
 
-/* Makes the rays inactive that the surface in a polyhedron blocks. Decomposed polyhedra stay in the thread's store from
- * bundle to bundle, and each bundle transforms them into its own tile space. */
+/* Removes the rays that the surface in a polyhedron blocks from the packet's active rays. The thread keeps the
+ * polyhedron's decomposition into tets for later bundles, but for each bundle the vertices are transformed into its own
+ * tile space. */
 static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const int part = occluder->part;

@@ -41,8 +41,8 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
-/* Sets those members of a pair that describe its ray, and the place of its hex's record. lane: the pair's lane; record:
- * index of the record in kernel_occluders.hexes. */
+/* Sets the members of a pair that describe its ray, and the member `record`. lane: the pair's lane; record: index of
+ * the hex's record among those in kernel_occluders.hexes. */
 SIMD_INLINE void kernel_pairs_set_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
                                       kernel_curved_pairs *out)
 {
@@ -104,9 +104,9 @@ SIMD_INLINE vm kernel_pairs_miss_slab(const kernel_curved_pairs *pairs, vf from,
     return vm_or(vf_lt(thick, vf_min(first, last)), vf_lt(vf_max(first, last), -thick));
 }
 
-/* Returns the pairs for which the field is monotone along the ray, and at both ends farther from 0 than the jumps at
- * faces (the difference between a face's value and the field next to it). The signs at the ends then decide whether
- * there is a root. */
+/* Returns the pairs for which the field is monotone along the ray in the hex, and at both ends farther from 0 than the
+ * bound of the jump at a face (the difference between the face's value and the field next to it). For these pairs, the
+ * signs at the ends decide whether the ray crosses the surface. */
 static __attribute__((noinline)) vm kernel_pairs_are_monotone(const kernel_curved_pairs *pairs,
                                                               const kernel_point ends[2])
 {
@@ -148,8 +148,8 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     return blocked;
 }
 
-/* Classifies the collected pairs: closes rays that are blocked, and adds undecided pairs to their list. Empties *pairs.
- * Returns false if memory ran out. */
+/* Decides, for the collected pairs of a ray and a hex, whether the hex blocks the ray: clears is_open of blocked rays,
+ * and adds undecided pairs to the list s->undecided. Empties *pairs. Returns false if memory ran out. */
 static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluders *o, kernel_secondary_rays *s,
                                                            kernel_curved_pairs *pairs)
 {

@@ -10,9 +10,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Size of the stack of nodes that a ray has not visited yet; a leaf is stored as ~index. On each level of the tree all
- * children of a node but one may be left on the stack, and the tree is at most one level deeper than the binary tree
- * from which it was built. */
+/* Size of the stack of nodes and leaves that a ray has not visited yet; a leaf is stored as the complement of its
+ * index, ~index. On each level of the tree all children of a node but one may be left on the stack, and the tree is at
+ * most one level deeper than the binary tree from which it was built. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 /* Returns the index of the next leaf that the ray may meet; -1 if there is none. *top: number of nodes on the stack,

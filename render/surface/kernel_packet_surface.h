@@ -14,9 +14,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Computes normals by central differences for the nearest opaque hits of the surface s, on the given rays. Returns the
- * hits that have a normal. The other hits are added to the list of pending hits, because they need samples of other
- * ranks' cells. */
+/* Computes normals by central differences for the given rays' hits on the opaque surface s. Returns the hits whose
+ * normals are known. The other hits need samples of other ranks' cells, and are added to the list of pending hits. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     kernel_surface_hits h = {.value = vi_from_vf(hits->kind) - (int)s->first_kind, .t = p->t_far, .reach = hits->reach};

@@ -13,15 +13,15 @@
 
 enum { MOST_LANES = 16 };
 
-/* The state of converting a binary tree to a tree with one child per lane. */
+/* The state of the conversion of a binary tree to a tree with one child per lane. */
 typedef struct widening {
     const occluder_piece *pieces;
     int64_t piece_count;
     int rows; /* number of floats that are stored for a piece, one in each row of a leaf */
     const mmbvh *binary;
-    /* for each node, the pieces below it: index of the first in the binary tree's list of cells, and their number */
+    /* for each node of the binary tree, the pieces below it: index of the first in binary->cells, and their number */
     int64_t *first, *count;
-    float *boxes; /* for each node, lower and upper corner of its box */
+    float *boxes; /* for each node of the binary tree, 6 numbers: lower and upper corner of its box */
     int width;
     kernel_occluder_tree *out;
 } widening;
@@ -129,8 +129,9 @@ static int divide_range_among_children(const widening *w, const piece_range *who
     return count;
 }
 
-/* Creates a leaf of the pieces in a range, and returns ~index of the leaf. Lanes without a piece get NaN or empty
- * boxes, so that no ray meets them. */
+/* Creates a leaf of the pieces in a range, and returns the bitwise complement of its index (~index), which
+ * distinguishes leaves from nodes. Lanes without a piece get triangles of NaN or empty boxes, so that no ray meets
+ * them. */
 static int32_t make_leaf(widening *w, const piece_range *of)
 {
     const int32_t leaf = w->out->leaf_count++;

@@ -8,8 +8,9 @@
 #include "insitu/status.h"
 #include "kernel_occluders.h"
 
-/* A piece of a surface: a triangle in a tet, or the slab of another cell (kernel_occluders.h), as the numbers that are
- * stored for it in the rows of a leaf, one per row. Triangles use only the first KERNEL_TRIANGLE_ROWS rows. */
+/* A piece of a surface: a triangle in a tet, or in another cell the slab (the space between two parallel planes that
+ * contains the surface in the cell). rows[i]: the number that is stored for the piece in row i of its leaf
+ * (kernel_occluders.h). Triangles use only the first KERNEL_TRIANGLE_ROWS elements. */
 typedef struct occluder_piece {
     float rows[KERNEL_SLAB_ROWS];
     int32_t surface; /* index of the surface in the frame */

@@ -1,11 +1,12 @@
-/* Collects occluders. Threads go through the subtrees of the meshes' trees, and each lists the occluders in its cells.
- * The lists are joined, and render_occluder_tree.c builds trees over them. The order of the lists does not matter
- * (kernel_occluders.h).
+/* Collects occluders: cells that an opaque surface crosses, which may block rays from hits. Threads go through the
+ * subtrees of the meshes' trees, and each lists the occluders in its subtrees. The lists are joined, and
+ * render_occluder_tree.c builds trees over them. The order of the lists does not matter (kernel_occluders.h).
  *
- * A slab contains the part of the surface in a cell. It lies between two planes on which a linear function L is
- * constant. L is fitted to the values at the vertices by least squares. The position and the value of any point of the
- * cell are weighted means of those of the vertices, with the same weights. So the field differs from L nowhere by more
- * than the largest difference at a vertex, which determines the slab's thickness. */
+ * For cells other than tets, a slab is stored, which contains the surface in the cell: the space between two parallel
+ * planes, on each of which a linear function L is constant. L is fitted to the values at the vertices by least squares.
+ * The position and the value of any point of the cell are weighted means of those of the vertices, with the same
+ * weights. So the field differs from L nowhere by more than the largest difference at a vertex, which determines the
+ * slab's thickness. */
 #include "render_occluders.h"
 
 #include <math.h>
@@ -25,7 +26,7 @@
 
 enum { HEX_BYTES = KERNEL_CURVED_RECORD_WORDS * sizeof(float) };
 
-/* A growing list of items of one size. */
+/* A growing array whose items all have the same size. */
 typedef struct list {
     int64_t count, capacity;
     void *items;
@@ -36,9 +37,9 @@ typedef struct occluder_search {
     const kernel_frame *frame;
     list triangles, slabs; /* items are occluder_piece */
     list cells;            /* items are kernel_occluder: the cells of the slabs, in the same order */
-    list hexes;            /* records of hexes (kernel_occluders.h), HEX_BYTES each */
+    list hexes;            /* per hex, its record of HEX_BYTES bytes: vertices, values and faces (kernel_occluders.h) */
     bool out_of_memory;
-    kernel_occluder cell; /* the cell that is being searched, and the isovalue */
+    kernel_occluder cell; /* the cell that is being searched, and the isovalue in it */
     /* number of entries in `places` and `values`: the cell's vertices, some several times if it is a polyhedron */
     int count;
     list places, values; /* positions of the vertices in tree space (3 doubles each), and the field there (double) */
@@ -67,7 +68,7 @@ static void free_lists(occluder_search *s)
     for (int i = 0; i < 6; i++) base_free(lists[i]->items);
 }
 
-/* ---- a cell --------------------------------------------------------------------------------------------------- */
+/* ---- the vertices of the current cell ------------------------------------------------------------------------- */
 
 static const double *place_of(const occluder_search *s, int i)
 {
@@ -100,7 +101,7 @@ static bool add_vertex(occluder_search *s, const double world[3], double value)
     return true;
 }
 
-/* ---- tets ------------------------------------------------------------------------------------------------------ */
+/* ---- the triangles of the surface in a tet ----------------------------------------------------------------------- */
 
 /* Computes the point, in tree space, at which the surface crosses the edge between vertices i and j. These must be in
  * the lexicographic order of coordinates, so that all cells of the edge compute the same bits. */
@@ -144,7 +145,7 @@ static void add_tet(occluder_search *s, double isovalue)
     if (n == 4) add_triangle(s, at[0], at[2], at[3]);
 }
 
-/* ---- slabs ----------------------------------------------------------------------------------------------------- */
+/* ---- slabs, which contain the surface in other cells ------------------------------------------------------------- */
 
 /* Solves m x = b for a symmetric matrix m. x is 0 if m is nearly singular; then the slab is the whole cell. */
 static void solve(double m[3][3], const double b[3], double x[3])
@@ -216,15 +217,16 @@ static void fill_slab(const occluder_search *s, double isovalue, occluder_piece 
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
     /* The slab must also contain points at which the computed field is 0 only because of rounding. The thickness
-     * therefore includes 1e-5, which exceeds the rounding of values (6e-8 of the largest) and the error of roots
-     * (KERNEL_ROOT_BAND). KERNEL_SLAB_ERROR is the error of L by the rounding of positions, divided by the positions'
-     * magnitude. */
+     * therefore includes 1e-5, which exceeds the rounding errors of values (6e-8 of the largest) and of the field at
+     * roots (KERNEL_ROOT_BAND). KERNEL_SLAB_ERROR is an upper bound of the error of L due to the rounding of positions,
+     * divided by the positions' magnitude. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Stores the corners of the hex's faces, in the form of kernel_transformed_curved.corners. */
+/* Stores which vertices are the corners of the hex's faces in its record, in the form of
+ * kernel_transformed_curved.corners. */
 static void fill_faces(const kernel_cell *c, float *record)
 {
     for (int face = 0; face < 6; face++) {
@@ -248,8 +250,9 @@ static bool collapses(const kernel_cell *c)
     return false;
 }
 
-/* Adds the hex's record, and returns its index. Returns -1 if the hex gets no record, because rays must be traced in it
- * one by one: if the job has clips, if one of its faces has collapsed to a triangle, or if memory ran out. */
+/* Adds the hex's record (its vertices, values and faces, from which crossings of rays with its faces are computed) to
+ * s->hexes, and returns the record's index. Returns -1 if the hex gets no record, because rays must be traced in it one
+ * by one: if the job has clips, if a face of the hex has collapsed to a triangle, or if memory ran out. */
 static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const double scale = scale_of(s, isovalue);
@@ -276,7 +279,7 @@ static void add_slab(occluder_search *s, const kernel_cell *c, double isovalue)
     cell->record = record;
 }
 
-/* ---- collecting -------------------------------------------------------------------------------------------------- */
+/* ---- collecting occluders in subtrees ---------------------------------------------------------------------------- */
 
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
 static bool list_cell_vertices(occluder_search *s, kernel_cell *c, const grid *g)
@@ -313,8 +316,8 @@ static void find_in_cell(occluder_search *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    /* in tree space, in which the trees are; kernel_occlusion_is_beyond_contact() computes the same from world
-     * coordinates */
+    /* The reach is a distance in tree space, because s->places are in tree space. kernel_occlusion_is_beyond_contact()
+     * computes the same distance from world coordinates. */
     s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
     for (s->cell.value = 0; s->cell.value < layer->value_count; s->cell.value++) {
         const double isovalue = layer->values[s->cell.value];
