@@ -1,5 +1,5 @@
-/* Processes the hits of rays on isosurfaces: tests clips, computes normals and colours, and keeps each ray's nearest
- * hit (thesis, sections 4.3.4 and 4.3.5). Terms of this file and of those that include it:
+/* Processes the hits of rays on isosurfaces: discards hits that clips remove, computes normals and colours, and keeps
+ * each ray's nearest hit (thesis, sections 4.3.4 and 4.3.5). Terms of this file and of those that include it:
  *     hit           crossing of a ray with an isosurface; it is accepted if clips keep it and no nearer hit hides it
  *     depth t       a hit's position on its ray: z in tile space, in scaled units (render_space); 0 at depth_origin
  *     kind          number that a fragment has for its isovalue: the surface's first_kind plus the isovalue's index
@@ -45,9 +45,9 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
     }
 }
 
-/* Reads a cell and transforms it into tile space. gradient[k] receives component k of the gradient, in camera axes: in
- * a tet the values at the vertices, in other cells the coefficients of the polynomial that interpolates these values.
- */
+/* Reads a cell and transforms it into tile space. Stores component k of the gradient, in camera axes, in gradient[k]:
+ * in a tet the component's values at the vertices, in other cells the coefficients of the polynomial that interpolates
+ * these values in reference coordinates. */
 static void kernel_fetch_gradient_polynomials(const kernel_packet *p, const render_surface_layer *layer, int part,
                                               uint32_t index, kernel_cell *c,
                                               double gradient[3][GRID_MAX_CELL_VERTICES])
@@ -68,8 +68,8 @@ static void kernel_fetch_gradient_polynomials(const kernel_packet *p, const rend
     }
 }
 
-/* Computes a point's barycentric coordinates in a tet. Each coordinate outside [-1, 2], which occurs only if the point
- * is far outside or the tet has no volume, is replaced by 1/4. */
+/* Computes a point's barycentric coordinates in a tet. Each of the four that is outside [-1, 2], which occurs only if
+ * the point is far outside the tet or the tet has no volume, is replaced by 1/4. */
 SIMD_INLINE void kernel_compute_barycentric(const double corner[4][3], const double point[3], double out[4])
 {
     double d[4][3], sum = 0;
@@ -239,10 +239,10 @@ typedef struct kernel_surface_hits {
     vf normal[3];
     vf colour[3];                   /* colour before lighting, linear RGB */
     vf w;                           /* value of the colour field, in its transfer function's domain */
-    const kernel_line_field *along; /* the field of contour lines; NULL if the surface has none */
+    const kernel_line_field *along; /* the field of contour lines at the hits; NULL if the surface has no such lines */
     /* distance to the samples of central differences, in scaled units; 0: the hit needs no samples */
     vf reach;
-    vf opacity;    /* used only by transparent surfaces */
+    vf opacity;    /* opacity, used only by transparent surfaces */
     vi part, cell; /* the cells that are hit, as in kernel_hits */
     /* The vertices of the cells that are hit. vertices: x, y and z in tile space (elements 0 to 2), and the field minus
      * the isovalue, times a power of two (element 3), each by vertex and lane. lane: the lane that holds each ray's
@@ -259,8 +259,8 @@ SIMD_INLINE vf kernel_hit_kinds(const kernel_surface *s, const kernel_surface_hi
 }
 
 /* Emits each tied hit (a hit with the same depth as its ray's nearest hit) as a fragment of its own. Tied hits occur if
- * a cell's map is folded. Compositing compares the bits of fragments of equal depth to select one of them, so that the
- * order of cells does not matter. */
+ * a cell's map from reference coordinates is folded (not one-to-one). Compositing compares the bits of fragments of
+ * equal depth to select one of them, so that the order of cells does not matter. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                              const kernel_surface_hits *h)
 {

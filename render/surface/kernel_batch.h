@@ -35,22 +35,24 @@ typedef struct kernel_batch {
     const kernel_surface_cells *queued; /* the cells that are being traced */
     /* the cells in tile space; f is the field minus the isovalue, times a power of two */
     kernel_transformed_tets tets;
-    bool is_of_faces; /* copy of the layer's is_of_faces */
+    bool is_of_faces; /* copy of render_surface_layer.is_of_faces */
     bool is_plain;    /* set if hits only need the colours of their isovalues (kernel_tile_hits_are_plain()) */
-    bool has_normals; /* set if `normal` is computed */
+    bool has_normals; /* set if `normal` has been computed */
     vf normal[3];     /* a vector along the gradient in each cell, of any length, in camera axes */
     /* the contour lines' field in each lane's cell (members of kernel_tet_line); valid in the lanes whose bits are set
      * in line_lanes */
     unsigned line_lanes;
     float line_value[SIMD_WIDTH], line_gradient[3][SIMD_WIDTH], line_along[SIMD_WIDTH];
-    /* rays to be traced: pixel, and lane of the cell. The first whole_count rays are whole packets. */
+    /* rays to be traced: the pixel of each, and the lane that holds its cell. The first whole_count rays are whole
+     * packets, each with one cell. */
     kernel_pixel_list rays;
     int whole_count;
 } kernel_batch;
 
-/* ---- lanes are cells ---- */
+/* ---- transforming cells, one per lane ---- */
 
-/* Stores the mesh part's indices of the vertices of lane n's cell, in the order of coordinates (kernel_cell.h). */
+/* Stores the indices, in the mesh part, of the vertices of lane n's cell, sorted by the vertices' coordinates
+ * (kernel_cell.h). */
 SIMD_INLINE void kernel_batch_vertices(const kernel_batch *b, int n, int64_t out[4])
 {
     for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_index(b->queued, b->tets.vertex[i][n]);
@@ -105,11 +107,11 @@ static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch 
     b->has_normals = true;
 }
 
-/* ---- lanes are pixels ---- */
+/* ---- tracing rays, one per lane ---- */
 
-/* Returns the rays that have a visible hit on the surface in their cells. is_whole: set if the rays are a whole packet,
- * which has one cell; *depth: depths of the hits; has_colour: set if *w, the values of the colour field at the hits,
- * are computed, too. */
+/* Returns the rays that have a visible hit on the surface in their cells, and stores the depths of the hits in *depth.
+ * is_whole: set if the rays are a whole packet with one cell; has_colour: set if the values of the colour field at the
+ * hits are to be stored in *w. */
 SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_batch *b, const kernel_lane_rays *r,
                                       bool is_whole, bool has_colour, vf *depth, vf *w)
 {

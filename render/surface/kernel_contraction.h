@@ -9,9 +9,9 @@
  *     L(X0) + t grad L . d + E(r) = 0             the field is the isovalue there
  * become one equation when the second is used to eliminate t:
  *     r = f(r) = a - N(r) - w E(r) / (grad L . d),        a = y - w L(X0) / (grad L . d).
- * f changes by no more than K = theta + |w| |grad E| / |grad L . d| per unit length in the domain (the norms are those
- * of kernel_bounds.h). If K < 1, f is a contraction, and by the theorems of Banach and Krawczyk, for a point q of the
- * domain, with s = f(q) - q:
+ * f changes by no more than K = theta + |w| |grad E| / |grad L . d| per unit length in the domain, where theta is an
+ * upper bound of the norm of N's derivative (kernel_bounds.h computes these bounds). If K < 1, f is a contraction, and
+ * by the theorems of Banach and Krawczyk, for a point q of the domain, with s = f(q) - q:
  *     one     The ball of radius K / (1 - K) |s| about f(q), if it lies in the domain, is mapped into itself: it
  *             contains a root, and the domain has no other.
  *     none    A root x in a convex part D of the domain satisfies |f(q) - x| <= K |q - x|, hence
@@ -39,9 +39,9 @@
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* Error of the reference coordinates r below which one more step of Newton's method is sufficient. That step leaves an
- * error of 2 K / (1 - K) times the square of this one, where K is the contraction constant, because the derivative of f
- * changes by about 4 K per unit length: 1.8e-7 at most. */
+/* Error of the reference coordinates r below which one more step of Newton's method is sufficient. The derivative of f
+ * changes by about 4 K per unit length, where K is the contraction constant. So that step leaves an error of about 2 K
+ * / (1 - K) times the square of this one: 1.8e-7 at most, because K is below 0.9. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
 /* A ray in the reference space of its cell, and the cell's coefficients and error bounds; one ray per lane. */
@@ -49,7 +49,7 @@ typedef struct kernel_contraction {
     /* y and w are defined at the top of this file; X0 is the ray's point at the depth of vertex 0. level: L at X0;
      * rise: the change of L per unit of depth along the ray (grad L . d). */
     vf y[3], w[3], level, rise;
-    /* copies of members of kernel_bounds, gathered from the lane of each ray's cell */
+    /* the members of the same names of kernel_bounds, gathered from the lane of each ray's cell */
     vf offset[3], middle, terms[4][3], field_terms[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
@@ -88,8 +88,9 @@ SIMD_INLINE void kernel_contraction_set_cell(const kernel_bounds *b, vi lane, in
     out->domain_margin = kernel_gather_lane(b->domain_margin, lane);
 }
 
-/* Moves the reference coordinates r to the nearest point of the domain D: the reference domain, for hexes and wedges
- * widened by domain_margin. For a pyramid, r is moved to a point that is only close to the nearest one. */
+/* Moves the reference coordinates r to the nearest point of the domain D. For hexes and wedges, D is the reference
+ * domain widened by domain_margin; for pyramids it is the reference domain itself, and r is moved to a point of D that
+ * is only close to the nearest one. */
 SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
 {
     const vf half = 0.5f + domain_margin;
@@ -146,15 +147,15 @@ SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
 }
 
 /* Returns the rays for which the step s = f(q) - q of the iteration proves that the domain D contains no root (case
- * "none" at the top of this file). If there were a root, |s| would be at most two diameters of D. So the rounding error
- * of both sides of the test is at most 2 error_bound (|s| + 2), for which 8 error_bound and a thousandth of |s|^2 are
- * more than enough. */
+ * "none" at the top of this file: |s|^2 is larger than 2 s . (x - q) for all x in D). If there were a root, |s| would
+ * be at most two diameters of D. So the rounding errors of the two sides together are at most 2 error_bound (|s| + 2).
+ * The test allows for 8 error_bound and a thousandth of |s|^2, which is more. */
 SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_support(type, c->domain_margin, s) - kernel_dot(s, q);
     vf error_bound = 8.0f * c->error_bound;
-    /* for a pyramid, whose domain D is not widened, the maximum over D is raised by twice the error of face crossings
-     * instead */
+    /* the domain D of a pyramid is not widened by domain_margin, the bound of the errors of face crossings; instead,
+     * twice the maximum over D is increased by 4 domain_margin */
     if (kernel_has_apex(type)) error_bound = 4.0f * c->domain_margin;
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
@@ -180,8 +181,8 @@ SIMD_INLINE void kernel_find_only_root_by_contraction(const kernel_contraction *
         kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_to_local(type, q, local);
         kernel_nonlinear_terms_at(type, local, term, unused);
-        /* kernel_bounds.h computes J0 with a b / k^2 = 1/2 instead of 1/4, the value at the centre, which leaves this
-         * linear term */
+        /* For a pyramid, kernel_bounds.h computes J0 with the value 1/2 of a b / k^2 instead of 1/4, its value at the
+         * centre. Therefore N also has this linear term. */
         if (kernel_has_apex(type)) term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {
             vf at = a[i];

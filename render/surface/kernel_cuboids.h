@@ -29,8 +29,8 @@
 
 enum { KERNEL_CUBOID_STEPS = 8 };
 
-/* Newton's method has converged when a step in s is shorter than this; one last step follows. The error of that step is
- * at most the square of this number, times half the ratio of the polynomial's second derivative to its first. */
+/* Newton's method has converged when a step in s is shorter than this; one last step follows. The error after that step
+ * is at most the square of this number, times half the ratio of the polynomial's second derivative to its first. */
 #define KERNEL_CUBOID_END 1e-4f
 
 /* Upper bound of the rounding error of a Bernstein coefficient, with u = 6e-8. The field's magnitude at vertices is at
@@ -49,8 +49,9 @@ typedef struct kernel_cuboids {
     float domain_margin[SIMD_WIDTH]; /* margin in reference coordinates; infinite for cells that are not cuboids */
 } kernel_cuboids;
 
-/* Computes the rows of the inverse Jacobians in tile space, for the first (half = 0) or the second half of the lanes.
- * After sorting by coordinates, vertices 1, 3 and 4 are the neighbours of vertex 0 along z, y and x. */
+/* Computes the rows of the inverse Jacobians in tile space (out->normal), for the first half of the lanes (half = 0) or
+ * the second. The vertices are sorted by coordinates, so that vertices 1, 3 and 4 are the neighbours of vertex 0 along
+ * z, y and x. */
 SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, const kernel_frame *f,
                                         const kernel_tile *tile, int half, kernel_cuboids *out)
 {
@@ -82,8 +83,9 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
 
 /* Computes value_error and domain_margin of the lanes in `cuboid`. In the code, reach is the largest magnitude of the
  * vertices' coordinates, gap an upper bound of the distance between a face's computed crossing and the ray, and own an
- * error bound of a ray's reference coordinates; gap and own are in reference coordinates. Both are derived at
- * kernel_f64_bounds() and kernel_bounds_store_iteration_errors(), and are doubled as there. */
+ * error bound of a ray's reference coordinates; gap and own are in reference coordinates. The comments on
+ * kernel_f64_bounds() and kernel_bounds_store_iteration_errors() derive gap and own; both are doubled here as they are
+ * there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {
@@ -209,8 +211,8 @@ SIMD_INLINE vf kernel_cuboid_derivative(const vf k[4], vf s)
 }
 
 /* Refines the root *s of the given rays by Newton's method; a step that leaves the bracket of the root is replaced by a
- * bisection. Returns the rays that have not converged. A ray that has converged is not changed any more, so that its
- * root does not depend on the other rays. */
+ * bisection. Returns the rays whose roots have not converged. A root that has converged is not changed any more, so
+ * that it does not depend on the other rays. */
 SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s)
 {
     vf low = vf_set(0), high = vf_set(1);

@@ -1,8 +1,8 @@
 /* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile (kernel_batch.h defines batch, block and
  * box). A cell of a few pixels would leave most lanes of a block's packet idle, and half of the rays in the cell have
  * no crossing. So rays of several cells are listed one after the other and traced in vectors, each lane with a ray and
- * the index of the lane that holds its cell. After each stage the undecided rays are moved together again. The stages,
- * with their rays, question and method, are:
+ * the index of the lane that holds its cell. After each stage the undecided rays are moved to the front of their list,
+ * so that the next stage's vectors are full again. The stages, with their rays, question and method, are:
  *     pixels of boxes       where is the only root in a cuboid?             kernel_cuboids.h
  *     undecided rays        is the only crossing known, or is there none?   kernel_contraction.h
  *     undecided rays        which faces does the ray cross?                 signs of edge functions
@@ -55,7 +55,8 @@ typedef struct kernel_curved_batch {
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_cuboids cuboids;
-    bool has_bounds; /* set if the bounds and the faces of the transformed cells have been computed */
+    /* set if `bounds` and the data of the cells' faces (kernel_transformed_faces()) have been computed */
+    bool has_bounds;
     kernel_bounds bounds;
     unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
@@ -64,9 +65,9 @@ typedef struct kernel_curved_batch {
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
-    /* The ends of the intervals of the rays in `found` and in `others`: by end, then t, value and reference coordinates
-     * of the point, then ray (kernel_curved_ends_add()). If a ray's root is known by contraction, it is stored instead
-     * of the first end. */
+    /* The ends of the intervals of the rays in `found` and in `others`. First index: 0 for the interval's begin, 1 for
+     * its end; second index: 0 for t, 1 for the value, 2 to 4 for the reference coordinates; third index: the ray's
+     * index in its list. If a ray's root is known by contraction, the root is stored instead of the begin. */
     float found_ends[2][5][KERNEL_LIST_ROOM], other_ends[2][5][KERNEL_LIST_ROOM];
 } kernel_curved_batch;
 
@@ -84,9 +85,9 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
         .type = h->queued->type, .at = h->transformed.at, .colours = h->colours, .bounds = &h->bounds};
 }
 
-/* ---- single cells of the batch ---- */
+/* ---- tracing one cell of the batch at a time ---- */
 
-/* Copies the cell in lane n to h->cells[n], with its edge functions, unless it has been copied before. */
+/* Copies the cell in lane n to h->cells[n], and computes its edge functions, unless that has been done before. */
 SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
 {
     if (h->copied_lanes >> n & 1) return;
@@ -133,7 +134,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
     return blocks;
 }
 
-/* ---- rays ---- */
+/* ---- stages of tracing the listed rays ---- */
 
 /* Returns the rays that have no root because, between the cell's bounding planes, they stay outside of the slab in
  * which the isosurface lies. The slab is |L| <= thickness, where L is the linear function that approximates the field
@@ -153,8 +154,8 @@ SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi 
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Keeps some of the SIMD_WIDTH rays from index n on of the list h->rays (bit mask `rays`): moves them to the index
- * `kept` of the same list and the following ones. Returns the new number of kept rays. */
+/* Keeps those of the rays n to n + SIMD_WIDTH - 1 of the list h->rays whose bits are set in `rays`: moves them to the
+ * entries of the same list from index `kept` on. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_keep_rays(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {
@@ -323,9 +324,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return kernel_lane_hits_accept(t, h->queued, p, hit, &hits);
 }
 
-/* Computes what hits store as their normals: the field's gradients, transformed from tile space into camera axes. If
- * the layer has normals from vertices (RENDER_VERTEX), the reference coordinates r are stored instead;
- * kernel_vertex_normals() computes the normals from these later. */
+/* Sets `normal` to what hits store in place of their normals: the field's gradients, transformed from tile space into
+ * camera axes. If the layer has normals from vertices (RENDER_VERTEX), it is set to the reference coordinates r
+ * instead, from which kernel_vertex_normals() computes the normals later. */
 SIMD_INLINE void kernel_curved_batch_store_normal(const kernel_tile_trace *t, const vf gradient[3], const vf r[3],
                                                   vf normal[3])
 {
@@ -443,7 +444,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     return nearer;
 }
 
-/* ---- batches ---- */
+/* ---- processing a whole batch ---- */
 
 /* Computes the faces and the bounds (kernel_bounds) of the batch's cells, unless that has been done. */
 static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_curved_batch *h)

@@ -39,17 +39,19 @@
 /* One point per ray at which the field is sampled, for normals by central differences, and the field there. */
 typedef struct kernel_probe {
     const kernel_surface *surface;
-    int layer; /* number of the layer, which is part of the key of cached cells */
+    int layer; /* number that stands for the layer in the cache of cells (kernel_cell_cache_find()) */
     double isovalue;
     vf z;     /* depth in tile space of each ray's sample point */
     vf at[3]; /* the sample points in tree space */
-    /* margin by which the trees' boxes are extended, in scaled units: more than all rounding of the points */
+    /* margin by which the trees' boxes are extended, in scaled units; larger than the rounding errors of the sample
+     * points */
     float pad;
     vm found;  /* rays whose sample point is in a cell visited so far */
     vf sample; /* least value of the field at the point over the cells that contain it */
 } kernel_probe;
 
-/* Sets c->f to the vertex values minus the isovalue, times a scale that is the same for all cells of the surface. */
+/* Sets c->f to the values at the vertices minus the isovalue, times a factor that is the same for all cells that the
+ * surface crosses. */
 SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 {
     for (int i = 0; i < c->count; i++)
@@ -94,8 +96,8 @@ SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe,
     }
 }
 
-/* Returns the rays whose point may be in the cell: it lies in the cell's bounding box in tile space, widened by a
- * margin that is larger than all rounding errors. */
+/* Returns the rays whose sample point may be in the cell, because it lies in the cell's bounding box in tile space,
+ * extended by a margin that is larger than all rounding errors. */
 SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     const float *const places[3] = {c->x, c->y, c->z};
@@ -168,8 +170,9 @@ static void kernel_probe_sample_tree(kernel_packet *p, kernel_probe *probe, cons
     }
 }
 
-/* Computes probe->at, the points at depth t on the rays in tree space, and probe->pad, the margin of boxes. The points
- * have an error of at most 16 roundings (6e-8) of the size of positions near the scene and the eye. */
+/* Computes probe->at, the points at depth t on the rays in tree space, and probe->pad, the margin of boxes. The
+ * rounding errors of the points are at most 16 * 6e-8 times the magnitude of positions near the scene and the eye,
+ * which is the margin. */
 static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *probe)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
@@ -278,16 +281,16 @@ SIMD_INLINE float kernel_difference_sample_distance(const kernel_frame *f, const
 
 /* A group of consecutive pending hits of a list that belong to one packet and one isovalue, each in its own lane. */
 typedef struct kernel_pending_group {
-    kernel_tile tile; /* the group's tile, which the next group may reuse */
+    kernel_tile tile; /* the tile of the group's hits; set up anew only if the next group lies in another tile */
     kernel_packet packet;
     const kernel_surface *surface;
     int value, count;
     int lanes[SIMD_WIDTH]; /* lane of each hit of the group */
     vm rays;               /* lanes that have a hit */
-    vf t, reach;           /* members of render_pending_hit, by lane */
+    vf t, reach;           /* the members t and reach of the hits (render_pending_hit), by lane */
 } kernel_pending_group;
 
-/* Marks the tile of a new group as not yet set up. */
+/* Prepares *group for the first group of a list: marks its tile as not set up. */
 SIMD_INLINE void kernel_pending_group_reset(kernel_pending_group *group)
 {
     group->tile.x0 = group->tile.y0 = -1;
@@ -304,8 +307,9 @@ SIMD_INLINE void kernel_pending_find_surface(kernel_pending_group *group, const 
     }
 }
 
-/* Forms the group that begins with hits[0], and sets its tile, packet, surface and isovalue. group->count becomes the
- * number of its hits. count: number of hits that remain in the list. */
+/* Forms the group that begins with hits[0]: as many of the following hits as have the same packet and isovalue, each in
+ * another lane. Sets the group's tile, packet, surface and isovalue, and its number of hits, group->count. count:
+ * number of hits that remain in the list. */
 static void kernel_pending_group_begin(kernel_pending_group *group, const kernel_frame *f, kernel_thread *thread,
                                        const render_pending_hit *hits, int64_t count)
 {

@@ -16,15 +16,16 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns the squared distance between points a and b, which are given in each ray's plane. */
+/* Returns, per lane, the squared distance between points a and b, which have been projected along the lane's ray to
+ * coordinates x and y with the ray at the origin (kernel_edge_position()). */
 SIMD_INLINE vf kernel_squared_distance(const vf a[2], const vf b[2])
 {
     const vf x = b[0] - a[0], y = b[1] - a[1];
     return x * x + y * y;
 }
 
-/* Returns the squared distance from each ray, which is at the origin, to the edge between vertices a and b, which are
- * given in the ray's plane. */
+/* Returns the squared distance from each ray, which is at the origin, to the edge between vertices a and b, which have
+ * been projected along the ray (kernel_edge_position()). */
 SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -35,8 +36,8 @@ SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Projects one vertex per ray, given in tile space, to the ray's plane: its x and y minus those of the ray at the
- * vertex's depth. */
+/* Projects one vertex per ray, given in tile space, along the ray: computes the vertex's x and y minus those of the ray
+ * at the vertex's depth. */
 SIMD_INLINE void kernel_edge_position(const kernel_packet *p, vf x, vf y, vf z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);

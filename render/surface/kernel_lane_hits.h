@@ -1,7 +1,7 @@
-/* Accepts hits of rays that each have a cell of their own, one ray per lane (kernel_batch.h, kernel_curved_batch.h).
- * Several lanes may hold rays of the same pixel. Opaque hits are therefore compared with the nearest hits of their rays
- * one by one. Colours and light are computed with all lanes at once, by the functions that serve the packets of a tile:
- * a packet is made of the rays in the lanes. */
+/* Accepts hits (keeps each ray's nearest hit) of rays that each have a cell of their own, one ray per lane
+ * (kernel_batch.h, kernel_curved_batch.h). Several lanes may hold rays of the same pixel. Opaque hits are therefore
+ * compared with the nearest hits of their rays one by one. Colours and light are computed with all lanes at once, by
+ * the functions that serve the packets of a tile: a packet is made of the rays in the lanes. */
 #ifndef RENDER_KERNEL_LANE_HITS_H
 #define RENDER_KERNEL_LANE_HITS_H
 
@@ -20,8 +20,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns whether hits on the current layer only need the colours of their isovalues, so that they can be accepted
- * without a packet of their own (kernel_accept_opaque_hit_of_ray()). */
+/* Returns whether hits on the current layer are plain: the surface is opaque, and each hit has the colour of its
+ * isovalue, without colour field, edges or lines. Such hits are accepted without making a packet of their rays
+ * (kernel_accept_opaque_hit_of_ray()). */
 SIMD_INLINE bool kernel_tile_hits_are_plain(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
@@ -29,9 +30,9 @@ SIMD_INLINE bool kernel_tile_hits_are_plain(const kernel_tile_trace *t)
            t->frame->job->paint != RENDER_VALUES;
 }
 
-/* Computes own->reach if the layer's normals come from central differences: for each of the cells, the distance from a
- * hit to the points at which the field is sampled. world: coordinates of the cells' `count` vertices, by vertex and
- * axis, in two halves of the lanes. */
+/* Computes own->reach if the layer's normals come from central differences: for each cell, the distance from hits in it
+ * to the points at which the field is sampled. world: world coordinates by vertex, axis and half of the lanes; count:
+ * number of a cell's vertices. */
 SIMD_INLINE void kernel_surface_cells_set_reach(const kernel_tile_trace *t, kernel_surface_cells *own,
                                                 const kernel_f64 (*world)[3][2], int count)
 {

@@ -28,14 +28,16 @@
 #include "render.h"
 #include "simd.h"
 
-/* The contour lines' field at hits, one hit per lane. value: in the domain of the levels, in which the first level is 0
- * and the last is 1 (kernel_lines); gradient: change of that value per scaled unit, in camera axes; normal: a vector of
- * any length along the surface's normal, in camera axes. */
+/* The field whose contour lines are drawn, at hits on the surface, one hit per lane. value: the field, mapped linearly
+ * so that it is 0 on the first line and, if there are several lines, 1 on the last (kernel_lines); gradient: the
+ * gradient of `value` per scaled unit, in camera axes; normal: a vector of any length along the surface's normal, in
+ * camera axes. */
 typedef struct kernel_line_field {
     vf value, gradient[3], normal[3];
 } kernel_line_field;
 
-/* Returns the value of the contour lines' field at a vertex, in the domain of the levels; it may be NaN. */
+/* Returns the value at a vertex of the field whose contour lines are drawn, mapped as in kernel_lines (0 on the first
+ * line and, if there are several, 1 on the last); it may be NaN. */
 SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
 {
     return (grid_field_value(field, vertex) - s->lines.low) * s->lines.inverse_width;
@@ -71,11 +73,11 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* The field of contour lines, which is linear in a tet. Values are in the domain of kernel_lines, in which the first
- * level is 0. */
+/* The field whose contour lines are drawn, in one tet, in which it is linear. Values are mapped as in kernel_lines:
+ * they are 0 on the first line and, if there are several, 1 on the last. */
 typedef struct kernel_tet_line {
     float value;       /* value at the tet's last vertex */
-    float gradient[3]; /* per scaled unit, in camera axes */
+    float gradient[3]; /* gradient of the value per scaled unit, in camera axes */
     float along;       /* change of the value per scaled unit of depth along the tile's middle ray */
 } kernel_tet_line;
 
@@ -98,9 +100,9 @@ static __attribute__((noinline)) void kernel_compute_tet_line_field(const kernel
     for (int a = 0; a < 3; a++) out->gradient[a] = (float)g[a];
 }
 
-/* Moves the contour lines' field from the last corner of each lane's tet to the hit at depth t: adds the field's change
- * between the two points to out->value, which holds the value at the corner. last: the corner's position in tile space;
- * along: the field's change per unit of depth along the tile's middle ray. */
+/* Computes the contour lines' field at the hit at depth t in each lane's tet: out->value holds the field at the tet's
+ * last corner, and the field's change from there to the hit is added. last: the corner's position in tile space; along:
+ * the field's change per unit of depth along the tile's middle ray. */
 SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_rays *rays, vf t, const vf last[3],
                                         vf along)
 {
@@ -142,8 +144,9 @@ static __attribute__((noinline)) void kernel_curved_line_field(const kernel_pack
     kernel_map_line_field(p->tile, map, line, r, out);
 }
 
-/* Finds the line that is nearest to each hit (*line: index of its level), and returns the share of the hit's pixel that
- * this line covers. The share is 0 if the field is constant or NaN there. */
+/* Finds the contour line that is nearest to each hit, stores its index among the layer's lines in *line, and returns
+ * the share of the hit's pixel that this line covers. The share is 0 if the field is constant along the surface or NaN
+ * there. */
 static __attribute__((noinline)) vf kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile,
                                                           const kernel_surface *s, const kernel_rays *rays, vf t,
                                                           const kernel_line_field *at, vi *line)

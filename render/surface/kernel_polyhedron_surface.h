@@ -37,7 +37,7 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* ---- gradients in the cell ---- */
+/* ---- normals from the field's gradient in the polyhedron's tets ---- */
 
 /* Computes the gradient of the field in the tet between a surface triangle (index `facet`) and the polyhedron's centre,
  * in camera axes and in double. */
@@ -54,7 +54,8 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
     for (int a = 0; a < 3; a++) out[a] = out[a] > 1e18 ? 1e18 : out[a] >= -1e18 ? out[a] : -1e18;
 }
 
-/* Computes, for each hit, the sum over all tets that contain it of the field's gradients, each times the tet's sign.
+/* A polyhedron is divided into tets, each between a surface triangle and the centre; the sign of an inverted tet is -1.
+ * Computes, for each hit, the sum of the field's gradients in all tets that contain the hit, each times the tet's sign.
  * Returns the hits for which these signs sum to 1, so that the sum is valid. */
 static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
@@ -72,8 +73,9 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_pol
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
 
-/* Finds, for each hit at depth t, the tet of non-negative sign that contains it or is nearest to it along the ray.
- * out[ray] becomes the index of the tet's surface triangle; -1 if there is none. */
+/* Finds, for each hit at depth t, the tet of the polyhedron's decomposition that contains the hit or is nearest to it
+ * along the ray. Inverted tets are skipped. out[ray] becomes the index of the tet's surface triangle; -1 if there is no
+ * tet. */
 static void kernel_polyhedron_find_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
@@ -107,7 +109,7 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_c
     }
 }
 
-/* ---- gradients at vertices ---- */
+/* ---- normals interpolated from gradients at the vertices ---- */
 
 /* Computes the mean of the vertices' gradients, in camera axes. It is used as the gradient at the polyhedron's centre,
  * just as the centre's value is the mean of the vertices' values. */
@@ -122,9 +124,9 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
-/* Computes the barycentric coordinates (share) of a ray's point at depth t in the tet of surface triangle `facet`.
- * corners: indices of the tet's corners among the polyhedron's vertices, of which the last is the centre. ray: lane of
- * the packet. */
+/* Computes the barycentric coordinates (share) of a ray's point at depth t in the tet between the surface triangle with
+ * index `facet` and the centre. corners: receives the indices of the tet's corners in the polyhedron's arrays, the last
+ * for the centre. ray: lane of the packet. */
 static void kernel_polyhedron_barycentric(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
                                           int corners[4], double share[4])
 {
@@ -166,10 +168,10 @@ static __attribute__((noinline)) void kernel_polyhedron_vertex_normals(const ker
     }
 }
 
-/* ---- rays whose profiles need not be followed ---- */
+/* ---- bounds that prove that a ray does not cross the isovalue ---- */
 
-/* Computes upper bounds of how fast a tet's field falls and rises along the tile's rays, per unit of depth. spread:
- * upper bound of the rays' |slope_x| and |slope_y|. */
+/* Computes upper bounds of how fast the field in a tet falls and rises along any of the tile's rays, per unit of depth.
+ * spread: upper bound of the rays' |slope_x| and |slope_y|. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
                               double *rise)
 {
@@ -188,8 +190,8 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Computes c->fall and c->rise: upper bounds of how fast the field falls and rises along the tile's rays in any tet of
- * the cell, per unit of depth. They are infinite if a tet has no volume. */
+/* Computes c->fall and c->rise: upper bounds of how fast the field falls and rises, per unit of depth, along any of the
+ * tile's rays in any of the tets into which the polyhedron is divided. They are infinite if a tet has no volume. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
@@ -203,17 +205,18 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* Converts an upper bound of the field's slope to one for the scaled values c->f, limited so that products of two
- * bounds are finite. */
+/* Converts a bound of the field's slope (c->fall or c->rise) to one for the values c->f, which are the field times
+ * c->scale. The result is limited, so that the product of two such bounds is finite. */
 SIMD_INLINE vf kernel_scale_slope_bound(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
 }
 
-/* Returns the rays whose field may cross the isovalue between two faces at which it has the same sign. The test by the
- * bounds c->fall and c->rise is not valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or
- * the reverse; such rays are always returned. */
+/* Returns the rays on which the field may cross the isovalue although it is on the same side of the isovalue at both
+ * ends of the interval. The bounds c->fall and c->rise exclude such crossings on other rays. They are not valid if tets
+ * overlap, or if a ray crosses a quad's triangles but not its bilinear patch or the reverse; such rays are always
+ * returned. */
 SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r)
 {
     const kernel_interval *i = &r->interval;
@@ -229,21 +232,24 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
     return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
-/* ---- search for crossings along the profiles ---- */
+/* ---- crossings of the isovalue by the piecewise linear field on a ray ---- */
 
-/* The state of a search along the rays' profiles, from crossing to crossing. A face's own value decides on which side
- * of the isovalue the field is there. If tets overlap at a face, the profile just behind the face may be on the other
- * side. The field then jumps at the face, and the jump is a crossing. */
+/* The state of a search along the rays' profiles (the piecewise linear field on each ray), from crossing to crossing of
+ * the isovalue. At a face, the value interpolated on the face decides on which side of the isovalue the field is. If
+ * tets overlap at the face, the profile just behind it may be on the other side. The field then jumps at the face, and
+ * the jump is a crossing. */
 typedef struct kernel_profile_walk {
     vm open;  /* rays on which more crossings may follow */
-    vm below; /* rays that are below the isovalue at the end of the current piece */
-    /* rays whose face value and profile are on different sides of the isovalue: at the entry, at the exit */
+    vm below; /* rays on which the field is below the isovalue at the end of the current piece */
+    /* rays on which the value on the face and the profile next to it are on different sides of the isovalue: at the
+     * face where the ray enters (jump_in) and leaves (jump_out) */
     vm jump_in, jump_out;
     kernel_interval piece; /* current linear piece of each ray's profile */
     vf t, w;               /* depth of the crossing that was found last; value of the colour field there */
 } kernel_profile_walk;
 
-/* Begins the search at the entry faces of the rays' current interval. */
+/* Begins the search for crossings of the isovalue at the faces where the rays enter their current interval
+ * (r->interval). */
 static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, kernel_profile_walk *walk)
 {
     const kernel_interval *i = &r->interval;
@@ -256,7 +262,7 @@ static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, k
     kernel_profile_begin(r, &walk->piece);
 }
 
-/* Copies the ends of the given rays' pieces from one interval to another. */
+/* Copies depths, values and colour values at both ends of a piece, on the given rays only. */
 SIMD_INLINE void kernel_copy_piece_ends(vm rays, const kernel_interval *from, kernel_interval *to)
 {
     to->t_in = vf_select(rays, from->t_in, to->t_in);
@@ -267,11 +273,11 @@ SIMD_INLINE void kernel_copy_piece_ends(vm rays, const kernel_interval *from, ke
     to->w_out = vf_select(rays, from->w_out, to->w_out);
 }
 
-/* Advances the rays in `left` to the next linear piece of their profiles. Returns the rays whose profile continues
- * behind that piece; a jump at the last face counts as a piece. A value inside the cell that equals the isovalue up to
- * rounding is treated as if it were on the side of the isovalue from which the ray comes. The reason: at one point a
- * ray may meet several faces between tets, whose values are rounded differently, so that their signs would alternate.
- * The values at the cell's faces are not changed. */
+/* Advances the rays in `left` to the next piece of their profiles, on which the field is linear. Returns the rays whose
+ * profile continues behind that piece; a jump at the last face counts as a piece. A value inside the cell that equals
+ * the isovalue up to rounding is replaced by one on the side of the isovalue from which the ray comes. The reason: at
+ * one point a ray may meet several faces between tets, whose values are rounded differently, so that their signs would
+ * alternate. The values at the cell's faces are not changed. */
 SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm left, kernel_profile_walk *walk)
 {
     kernel_interval next = walk->piece;
@@ -368,8 +374,8 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
     kernel_accept(p, s, hit, &at);
 }
 
-/* Finds the crossings in the current interval of the rays in `wanted`, and accepts them. A ray ends at the first
- * crossing of an opaque surface in front of the eye. */
+/* Finds the crossings of the isovalue in the current interval of the rays in `wanted`, and accepts them. A ray ends at
+ * the first crossing of an opaque surface that is in front of the eye and that clips keep. */
 static void kernel_polyhedron_accept_crossings(kernel_packet *p, const kernel_surface *s, int value, vm wanted,
                                                kernel_poly_crossings *r)
 {

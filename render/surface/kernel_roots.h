@@ -49,7 +49,8 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-#define KERNEL_ROOT_BAND 3e-7f /* rounding error of F if F's largest magnitude at a vertex is near 1 */
+/* bound of the rounding error of F (field minus isovalue), whose largest magnitude at a vertex is near 1 */
+#define KERNEL_ROOT_BAND 3e-7f
 /* Length, as a share of the interval, of the pieces at which bisection ends. */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
@@ -59,8 +60,9 @@ enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS =
  * interval's length. */
 typedef struct kernel_search {
     kernel_rays rays;
-    /* The following members are set only if some ray is not decided by the values at the ends of its interval: the
-     * cell's map, and members of kernel_bounds, gathered from each ray's own cell. */
+    /* The following members up to is_monotone are the cell's map, and copies of members of kernel_bounds or numbers
+     * derived from these, for each ray's own cell. Except for the map, they are set only if some ray is not decided by
+     * the values at the ends of its interval. */
     kernel_map map;
     vf nonlinear_part[3][8], inverse[3][3], stretch, slope, field_curvature, map_curvature;
     vf coarsest;    /* pieces longer than this share of the interval are always halved */
@@ -70,9 +72,9 @@ typedef struct kernel_search {
     vm open;                 /* rays that have unprocessed pieces */
     vm ended;                /* rays whose last piece has been processed; `side` is then the field's sign at its end */
     vf side;                 /* sign of the field at the begin of the current piece (`from`): 1 or -1 */
-    vf number, size, pieces; /* the current piece; number of pieces that have been tested */
-    kernel_point from, end;  /* begin of the current piece; end of the interval */
-    vm found;                /* rays with a root between the points low and high */
+    vf number, size, pieces; /* number, size: the current piece; pieces: number of pieces that have been tested */
+    kernel_point from, end;  /* from: begin of the current piece; end: end of the interval */
+    vm found;                /* rays on which a root has been isolated between the points low and high */
     kernel_point low, high;
 } kernel_search;
 
@@ -165,8 +167,8 @@ SIMD_INLINE vf kernel_sign_of(vf v)
     return vf_select(vf_lt(v, vf_set(0)), vf_set(-1), vf_set(1));
 }
 
-/* Sets at->value to the field just inside a face, at the point *at of each ray. face: the value that is interpolated on
- * the face itself; it is stored instead if the two differ only by rounding. */
+/* Sets at->value to the field in the cell at the point *at of each ray, which lies on a face. face: the value
+ * interpolated on the face alone; it is stored instead if the two values differ only by rounding. */
 SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
     const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
@@ -236,8 +238,9 @@ SIMD_INLINE vm kernel_decide_by_ends(const kernel_curved *c, const kernel_rays *
     return vm_andnot(left, vm_and(searched, far));
 }
 
-/* Tests the whole interval as one piece, from the reference coordinates and values at the faces. This decides most
- * rays. Adds the rays with an isolated root to s->found; s->open becomes the rays whose interval must be bisected. */
+/* Tests the whole interval as one piece, from the reference coordinates and values at its two ends on faces; this
+ * decides most rays. Adds the rays on which a root is isolated to s->found; s->open becomes the rays whose interval
+ * must be bisected. */
 SIMD_INLINE void kernel_search_test_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -299,8 +302,8 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     kernel_point_copy_lanes(inner, &at, to);
 }
 
-/* Advances rays to the next piece, which begins at the end of the current one (to). It is the longest piece that
- * bisection of the whole interval produces there. */
+/* Advances rays to the next piece, which begins at the end of the current one (to). The next piece is the longest one
+ * that repeated bisection of the whole interval gives there. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
     kernel_point_copy_lanes(rays, to, &s->from);
@@ -392,9 +395,10 @@ SIMD_INLINE void kernel_refine_by_bracketing(const kernel_search *s, vm rays, ke
     }
 }
 
-/* ---- the last step of a refinement ---- */
+/* ---- the last step of Newton's method, with residuals in double ---- */
 
-/* Returns the polynomial with the coefficients c (kernel_map.h) at the reference coordinates r; m: its product term. */
+/* Returns the value at the reference coordinates r of the polynomial with the coefficients c (kernel_map.h). m: the
+ * product r[0] * r[1], for a pyramid divided by r[2]. */
 SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
@@ -426,9 +430,9 @@ SIMD_INLINE void kernel_compute_residuals(const kernel_rays *rays, const kernel_
     }
 }
 
-/* Does a step of Newton's method for the four equations X(r) = (the ray's point at depth t) and F(r) = 0 at once; t
- * stays between low->t and high->t. off, value: the equations' residuals, which are 0 if the point lies on the ray and
- * has the isovalue. Returns the rays that have not converged. */
+/* Does a step of Newton's method for t and r in the four equations X(r) = (the ray's point at depth t) and F(r) = 0; t
+ * stays between low->t and high->t. off: the ray's point minus X(r); value: F(r). Returns the rays that have not
+ * converged. */
 SIMD_INLINE vm kernel_take_root_newton_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
                                             const kernel_point *high, vm wanted, const vf off[3], vf value,
                                             kernel_point *out)
@@ -469,8 +473,8 @@ SIMD_INLINE void kernel_take_last_newton_step(const kernel_rays *rays, const ker
     kernel_point_copy_lanes(vm_andnot(wanted, away), &last, out);
 }
 
-/* Does the last step of Newton's method for points whose reference coordinates have an error of at most
- * KERNEL_CONTRACTION_END. Changes the map's tolerance. */
+/* Does the last step of Newton's method for roots whose reference coordinates have an error of at most
+ * KERNEL_CONTRACTION_END. Changes map->tolerance. */
 SIMD_INLINE void kernel_refine_accurate_roots(const kernel_rays *rays, kernel_map *map, vm wanted, kernel_point *at)
 {
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};

@@ -52,7 +52,8 @@ SIMD_INLINE vm kernel_hit_normals(kernel_packet *p, const kernel_surface *s, vm 
     return s->layer->normal == RENDER_DIFFERENCES ? kernel_sample_or_defer_hits(p, s, hit, h) : hit;
 }
 
-/* Emits tied hits (hits with the same depth as their ray's nearest hit) as fragments of their own. */
+/* Computes the normals of tied hits (hits with the same depth as their ray's nearest hit), and emits these hits as
+ * fragments of their own. */
 static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                       vm tied, const kernel_surface_hits *h)
 {
@@ -148,8 +149,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit
 }
 
 /* Returns the value of a field at the reference coordinates r, in each ray's own cell. values: the field by vertex and
- * lane; lane: the lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single
- * function for all cell types that is not inlined. */
+ * lane; lane: the lane that holds each ray's cell. kernel_maps_value() computes the same, but is inlined separately for
+ * each cell type. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {
@@ -227,8 +228,8 @@ static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved
     KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out, none);
 }
 
-/* Accepts the crossings that contraction finds (kernel_contraction.h). Returns the rays that contraction has decided:
- * those with exactly one crossing, and those without one. */
+/* Finds crossings of the isovalue by contraction (a fixed-point iteration, kernel_contraction.h), and accepts them.
+ * Returns the rays that contraction has decided: those with exactly one crossing, and those without one. */
 static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, const kernel_surface *s,
                                                                     const kernel_cell *c, const kernel_curved *curved,
                                                                     int value, vm wanted)

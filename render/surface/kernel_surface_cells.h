@@ -17,8 +17,8 @@ typedef struct kernel_surface_cells {
      * field or, if the part's indices do not fit in 32 bits, those in `copied` */
     kernel_arrays arrays;
     uint32_t cell[SIMD_WIDTH]; /* index of the cell in the mesh part */
-    /* copies of the members of kernel_tile_candidate: the blocks and the box of pixels that the cell may meet, and its
-     * least depth */
+    /* copies of the members of kernel_tile_candidate: mask of the tile's blocks and box of the tile's pixels in which
+     * the cell may be visible, and the cell's least depth */
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     float near[SIMD_WIDTH];
     int value[SIMD_WIDTH]; /* index of the isovalue in the layer */
@@ -48,7 +48,7 @@ static inline void kernel_surface_cells_set_part(kernel_surface_cells *own, int 
     }
 }
 
-/* Returns the index in the mesh part of a vertex with the given index in the queue's arrays. */
+/* Returns the index in the mesh part of the vertex that has the index `vertex` in own->arrays. */
 SIMD_INLINE int64_t kernel_surface_cells_index(const kernel_surface_cells *own, int32_t vertex)
 {
     return own->arrays.has_lanes ? vertex : own->index[vertex];
@@ -68,8 +68,9 @@ static __attribute__((noinline)) void kernel_surface_cells_set_vertices(kernel_s
     }
 }
 
-/* Adds a cell that the current layer's surface crosses; the queue must not be full. value: index of the isovalue in the
- * layer; vertices: indices of the cell's vertices in the mesh part, or NULL if kernel_arrays.h can read them. */
+/* Adds a cell that the current layer's surface crosses to the queue, which must not be full. value: index of the
+ * isovalue in the layer; vertices: indices of the cell's vertices in the mesh part, or NULL if they are to be read from
+ * own->arrays. */
 SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_surface_cells *own,
                                           const kernel_tile_candidate *candidate, int value, const int64_t *vertices)
 {

@@ -32,20 +32,20 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->traced_blocks & kernel_blocks_not_hidden_at(t, candidate->near);
 }
 
-/* maximum number of listed polyhedra */
+/* maximum number of polyhedra in kernel_tile_search.polyhedra */
 enum { KERNEL_POLYHEDRA = SIMD_WIDTH };
 
 /* A tile's cells that are queued for tracing, and the state of the tile's search for cells in trees
  * (kernel_tile_surface.h). A thread keeps the struct from tile to tile. */
 typedef struct kernel_tile_search {
     int layer, part;      /* layer and mesh part of the cells that are being queued; -1: no cell has been queued yet */
-    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
+    kernel_arrays arrays; /* coordinates, connectivity and field values of the mesh part `part` */
     kernel_surface_cells pending[KERNEL_LANE_TYPES]; /* one queue per type */
     kernel_batch batch;
     kernel_curved_batch curved_batch;
-    int polyhedron_count; /* number of listed polyhedra */
+    int polyhedron_count; /* number of elements of `polyhedra` that are in use */
     kernel_tile_candidate polyhedra[KERNEL_POLYHEDRA];
-    /* binned candidates whose cells' vertex indices are being prefetched */
+    /* candidates from the tile's bin whose cells' vertex indices are being prefetched */
     int prefetched_count;
     const kernel_tile_candidate *prefetched[SIMD_WIDTH];
     /* The following members are used by the search. */

@@ -66,8 +66,8 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
 
 /* ---- traversal of nodes ---- */
 
-/* KERNEL_NODES_AT_ONCE: number of inner nodes whose children are tested at once, one child per lane, with siblings in
- * neighbouring lanes. While they are tested, the data of further nodes are prefetched. */
+/* KERNEL_NODES_AT_ONCE: maximum number of inner nodes whose children are tested at once, one child per lane, with
+ * siblings in neighbouring lanes. KERNEL_NODES_ROOM: size of the stack of nodes. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
 /* One node per lane: its bounding box in tree space and its range of values, and the results of testing it. near: its
@@ -79,7 +79,8 @@ typedef struct kernel_node_lanes {
     int32_t box[SIMD_WIDTH];
 } kernel_node_lanes;
 
-/* Reads the boxes and value ranges of nodes one by one, which works for every layout of nodes. */
+/* Reads the boxes and value ranges of nodes one by one, which works for every format in which a tree stores its
+ * nodes. */
 static __attribute__((noinline)) void kernel_nodes_fetch_scalar(const mmbvh *tree, const mmbvh_ranges *ranges,
                                                                 const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
 {
@@ -263,7 +264,8 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
 
 /* ---- surfaces ---- */
 
-/* Finds the cells of the given mesh parts; a callback for a leaf of the tree over all parts. */
+/* Finds the cells of the given mesh parts that the current layer's surface may cross in the tile. It has the parameters
+ * of the callback that kernel_tile_traverse() calls for a leaf of the tree over all parts. */
 static void kernel_find_cells_of_mesh_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
                                             unsigned blocks)
 {
