@@ -95,8 +95,8 @@ typedef struct render_transfer {
     const float *colours; /* colour table: colour_count × 3 numbers, linear RGB */
     render_scale scale;
     double threshold; /* end of the linear part of RENDER_SYMLOG, > 0; unused by other scales */
-    /* For surfaces only: the range is divided into colour_count bands of equal width, each with one colour of the
-     * table; colours are not interpolated. colour_count may then be 1. */
+    /* For surfaces only: the positions from 0 to 1 are divided into colour_count bands of equal width, each with one
+     * colour of the table; colours are not interpolated. colour_count may then be 1. */
     bool is_banded;
     /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. A value that is
      * outside the range by no more than the rounding error RENDER_END still counts as inside. NULL: values outside get
@@ -286,7 +286,8 @@ typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_
 typedef struct render_clip {
     render_clip_kind kind;
     bool is_outside;
-    /* half space normal . position <= distance, in world coordinates; the normal has any length but 0 */
+    /* for RENDER_CLIP_PLANE: the half space normal . position <= distance, in world coordinates; the normal may have
+     * any length but 0 */
     double normal[3], distance;
     double lower[3], upper[3]; /* opposite corners of a box, in world coordinates */
     double centre[3], radius;  /* centre and radius of a sphere, in world coordinates */
@@ -392,8 +393,8 @@ double render_jitter(uint32_t pixel, uint32_t frame);
 mmbvh_interval render_isovalue_interval(double value);
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
-/* Traces every pixel of the camera against this rank's parts and appends the fragments to *out. The caller must free
- * them with base_free(out->items). Tiles are traced in parallel. statistics may be NULL. */
+/* Traces the camera's pixels (all, or the set job->pixels) through this rank's mesh parts, and appends the fragments to
+ * *out. The caller must free them with base_free(out->items). Tiles are traced in parallel. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
 /* Draws as render_frame() does, but passes the fragments to take() tile by tile. Every pixel of the camera lies in one

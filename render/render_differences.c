@@ -31,7 +31,7 @@ void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_I
     for (int i = 0; i < job->surface_count; i++) render_surface_range(job, i, ranges[i]);
 }
 
-/* ---- ranks whose cells a hit needs ------------------------------------------------------------------------------ */
+/* ---- which ranks' cells a hit's normal needs -------------------------------------------------------------------- */
 
 static bool is_by_differences(const render_surface_layer *layer)
 {
@@ -119,7 +119,7 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
     return has_memory;
 }
 
-/* ---- samples and light ----------------------------------------------------------------------------------------- */
+/* ---- sampling the field around hits, and lighting hits --------------------------------------------------------- */
 
 /* Processes `count` pending hits in parallel, CHUNK_HITS at a time. If `out` is NULL, the field is sampled around the
  * hits and stored in `samples`. Otherwise the hits are lit: samples and shadings are read, and the fragments are stored

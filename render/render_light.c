@@ -320,7 +320,7 @@ static tracer *tracer_create(const render_occluders *of)
     return t;
 }
 
-/* Frees the tracer; returns false if memory ran out. */
+/* Frees the tracer. Returns false if t is NULL, or if memory ran out while it traced rays. */
 static bool tracer_free(tracer *t)
 {
     if (!t) return false;

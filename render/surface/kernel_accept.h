@@ -252,7 +252,7 @@ typedef struct kernel_surface_hits {
     const float (*vertices[4])[SIMD_WIDTH];
 } kernel_surface_hits;
 
-/* Returns the kinds of the hits, as floats. */
+/* Returns the hits' fragment kinds (numbers that stand for isovalues, fragment.h) as floats. */
 SIMD_INLINE vf kernel_hit_kinds(const kernel_surface *s, const kernel_surface_hits *h)
 {
     return vf_from_vi(h->value + (int)s->first_kind);
@@ -314,7 +314,8 @@ SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
     return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Returns the rays whose interval in the cell begins in front of their nearest hit and ends behind the eye's plane. */
+/* Returns the rays whose interval in the cell may have visible hits: it begins in front of the ray's nearest hit and
+ * ends in front of the eye. */
 SIMD_INLINE vm kernel_interval_overlaps_ray(const kernel_packet *p, const kernel_interval *i)
 {
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
@@ -344,8 +345,8 @@ SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surfac
     return kernel_hits_kept_by_clips(p, s->own_clips, in_front, t);
 }
 
-/* Returns those of the hits at depth t that the clips keep, in front of the eye and not behind the rays' nearest hits.
- */
+/* Returns those of the hits at depth t that are in front of the eye and not behind the rays' nearest hits, and that the
+ * surface's own clips keep. */
 SIMD_INLINE vm kernel_visible_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);

@@ -182,8 +182,8 @@ SIMD_INLINE void kernel_batch_normals(const kernel_tile_trace *t, kernel_batch *
     for (int a = 0; a < 3; a++) normal[a] = vf_permute(b->normal[a], lane);
 }
 
-/* Accepts plain hits (kernel_tile_hits_are_plain()) of one vector of rays. Returns a mask of the blocks that contain a
- * ray whose hit is nearer than its previous one. */
+/* Accepts hits of one vector of rays that need only the colours of their isovalues (kernel_tile_hits_are_plain()).
+ * Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_batch_accept_plain(kernel_tile_trace *t, kernel_batch *b,
                                                                     const kernel_lane_rays *r, vm hit, vf depth)
 {
@@ -267,9 +267,9 @@ static __attribute__((noinline)) void kernel_batch_trace(kernel_tile_trace *t, k
 
 /* ---- batches ---- */
 
-/* Sets up the packets of the blocks that the n-th cell may meet, and appends the cell's rays to the batch's list.
- * Traces the list if it is full. is_whole: set if all rays of `blocks` are listed; otherwise those of the cell's box
- * are listed, and `blocks` is not used. */
+/* Sets up the packets of the blocks in which the n-th cell may be visible, and appends rays to the batch's list: if
+ * is_whole is set, all rays of the blocks in the mask `blocks`, and otherwise those of the pixels in the cell's box.
+ * Traces the list if it is full. */
 SIMD_INLINE void kernel_batch_list_rays(kernel_tile_trace *t, kernel_batch *b, int n, unsigned blocks, bool is_whole)
 {
     for (unsigned left = b->queued->blocks[n] & ~t->begun; left; left &= left - 1)

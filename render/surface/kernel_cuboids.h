@@ -42,11 +42,14 @@ enum { KERNEL_CUBOID_STEPS = 8 };
 
 /* Coefficients and error bounds of cuboids, one cuboid per lane. */
 typedef struct kernel_cuboids {
-    float normal[3][3][SIMD_WIDTH]; /* rows of the inverse of the map's Jacobian; columns: axes of tile space */
-    float field[8][SIMD_WIDTH];     /* coefficients of the field's polynomial (kernel_map.h) */
+    /* inverse of the Jacobian of the map from reference coordinates to tile space, by row, column and lane */
+    float normal[3][3][SIMD_WIDTH];
+    float field[8][SIMD_WIDTH]; /* coefficients of the field's polynomial (kernel_map.h) */
     /* error bound of the field's Bernstein coefficients along a ray, for a field whose largest magnitude is near 1 */
     float value_error[SIMD_WIDTH];
-    float domain_margin[SIMD_WIDTH]; /* margin in reference coordinates; infinite for cells that are not cuboids */
+    /* By how much cells are widened, in reference coordinates, when a ray's interval is computed; a root that is less
+     * than this inside the cell is undecided (top of this file). Infinite for cells that are not cuboids. */
+    float domain_margin[SIMD_WIDTH];
 } kernel_cuboids;
 
 /* Computes the rows of the inverse Jacobians in tile space (out->normal), for the first half of the lanes (half = 0) or
@@ -131,8 +134,9 @@ static __attribute__((noinline)) void kernel_cuboids_compute(const kernel_transf
 
 /* A ray's interval in its cell widened by domain_margin, and the field along it, one ray per lane. */
 typedef struct kernel_cuboid_ray {
-    vf normal[3][3], field[8], value_error, domain_margin; /* copies of the members of kernel_cuboids */
-    vf origin[3];                                          /* vertex 0 in tile space */
+    /* members of kernel_cuboids, gathered from each ray's cell */
+    vf normal[3][3], field[8], value_error, domain_margin;
+    vf origin[3];     /* vertex 0 in tile space */
     vf begin, length; /* depth of the interval's begin relative to vertex 0, and the interval's length in depth */
     vf r[3], d[3];    /* reference coordinates at the interval's begin, and their change from there to its end */
     vf k[4];          /* coefficients k0 to k3 of the field's polynomial in s */
@@ -169,8 +173,8 @@ SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (
     return vf_le(begin, end);
 }
 
-/* Computes the coefficients k0 to k3 of the field along each ray's interval. lane: the lane that holds each ray's cell.
- */
+/* Computes the coefficients k0 to k3 of the cubic polynomial in s that is the field along each ray's interval. lane:
+ * the lane that holds each ray's cell. */
 SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
 {
     const vf *c = ray->field, *r = ray->r, *d = ray->d;

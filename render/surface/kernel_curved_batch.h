@@ -102,8 +102,9 @@ SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kerne
 }
 
 /* Traces, cell by cell, those rays of the vector that begins at index `first` of the list `rays` whose bits are set in
- * `wanted`. Rays with the same cell and packet are traced together. at_lanes: position of each ray of the vector among
- * the tile's packets. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+ * `wanted`. Rays with the same cell and packet are traced together. at_lanes: position of each ray among those of the
+ * tile's packets (packet * SIMD_WIDTH + lane). Returns a mask of the blocks that contain a ray whose hit is nearer than
+ * its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                            const kernel_pixel_list *rays, int first,
                                                                            vi at_lanes, unsigned wanted)
@@ -446,7 +447,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
 
 /* ---- processing a whole batch ---- */
 
-/* Computes the faces and the bounds (kernel_bounds) of the batch's cells, unless that has been done. */
+/* Computes the data of the faces (kernel_transformed_faces()) and the bounds (kernel_bounds) of the batch's cells,
+ * unless that has been done. */
 static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
@@ -483,7 +485,8 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
     h->rays.count = 0;
 }
 
-/* Lists the rays of a cell's box of pixels, and sets up the packets of its blocks. Traces the list if it is full. */
+/* Appends the rays of a cell's box of pixels to the list h->rays, and sets up the packets of the given blocks, in which
+ * the cell may be visible. Traces the list if it is full. */
 SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
                                                unsigned blocks)
 {
@@ -492,8 +495,8 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell that has an edge of length
- * zero is instead traced block by block at once. */
+/* Transforms the queued cells into tile space, and lists the rays of their boxes of pixels. A cell that has an edge of
+ * length zero is not listed, but traced block by block at once. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {

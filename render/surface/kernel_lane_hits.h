@@ -21,8 +21,8 @@
 #include "simd.h"
 
 /* Returns whether hits on the current layer are plain: the surface is opaque, and each hit has the colour of its
- * isovalue, without colour field, edges or lines. Such hits are accepted without making a packet of their rays
- * (kernel_accept_opaque_hit_of_ray()). */
+ * isovalue, without colour field, edges, lines or numbers in place of colours (RENDER_VALUES). Such hits are accepted
+ * without making a packet of their rays (kernel_accept_opaque_hit_of_ray()). */
 SIMD_INLINE bool kernel_tile_hits_are_plain(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
@@ -71,7 +71,8 @@ static __attribute__((noinline, cold)) vm kernel_lane_hits_kept_by_clips(const k
     return kernel_hits_kept_by_clips(&rays, t->surface->own_clips, hit, depth);
 }
 
-/* Returns those of the hits that the clips keep, in front of the eye and not behind the rays' nearest hits. */
+/* Returns those of the hits that are in front of the eye and not behind the rays' nearest hits, and that the surface's
+ * own clips keep. */
 SIMD_INLINE vm kernel_visible_lane_hits(const kernel_tile_trace *t, const kernel_lane_rays *r, vm hit, vf depth)
 {
     const vm visible = vm_and(hit, vm_and(vf_le(kernel_lane_rays_near(t, r), depth), vf_le(depth, r->far)));
@@ -156,8 +157,8 @@ SIMD_INLINE unsigned kernel_lane_hits_accept_opaque(kernel_tile_trace *t, const 
     return blocks;
 }
 
-/* Returns those of the hits whose pixels are traced, and adds the depths of these hits to their rays' crossings of
- * transparent surfaces. */
+/* Returns those of the hits whose rays are active in their packets. If the frame has volumes, adds the depths of these
+ * hits to the rays' lists of crossings of transparent surfaces. */
 SIMD_INLINE vm kernel_lane_hits_add_crossings(kernel_tile_trace *t, const kernel_lane_rays *r, vm hit, vf depth)
 {
     unsigned kept = 0;

@@ -56,7 +56,7 @@ enum {
     KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_ERROR, /* rounding error of L, divided by the largest magnitude of positions */
+    KERNEL_SLAB_ERROR, /* bound of L's rounding error, divided by the largest magnitude of positions */
     KERNEL_SLAB_REACH, /* reach: distance from a ray's hit within which the cell does not block it */
     KERNEL_SLAB_ROWS
 };
@@ -94,8 +94,9 @@ typedef struct kernel_occluder_tree {
 typedef struct kernel_occluders {
     int width; /* number of lanes of the kernels that traverse the trees */
     kernel_occluder_tree triangles, slabs;
-    kernel_occluder *cells; /* the cells of all slabs */
-    float *hexes;           /* records of hexes (KERNEL_CURVED_RECORD_WORDS floats each) */
+    kernel_occluder *cells; /* the cells that contain the slabs; slabs refer to them by sources[] */
+    /* for each hex with a record, KERNEL_CURVED_RECORD_WORDS floats: vertices, values and faces */
+    float *hexes;
 } kernel_occluders;
 
 /* A ray from a hit, in tree space. It ends at the distance `far` from its origin, in scaled units. is_open: set until
@@ -194,8 +195,8 @@ SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const flo
 
 /* ---- triangles ---- */
 
-/* Returns the triangles of a leaf that the ray crosses farther from its origin than their reach and before its end.
- * Stores the distances of the crossings in *t. */
+/* Returns a mask of a leaf's triangles, one per lane, that the ray crosses before its end and not closer to its origin
+ * than the triangle's reach (KERNEL_TRIANGLE_REACH). Stores the distances of the crossings in *t. */
 SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
@@ -219,7 +220,7 @@ SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const
 /* ---- slabs ---- */
 
 /* Computes, for each slab of a leaf, its linear function L along the ray, which is level + rise * t at the distance t,
- * and the slab's thickness, enlarged by the rounding error of L. */
+ * and the slab's thickness, enlarged by the bound of L's rounding error. */
 SIMD_INLINE void kernel_compute_slab_functions(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
                                                vf *thickness)
 {

@@ -27,7 +27,7 @@ typedef struct kernel_curved_pairs {
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
     /* The following members, except `record`, describe the pairs' rays, as in kernel_prepared_ray. Components of
      * origins and shears are in the order of the axes kx, ky and kz, which are chosen for each ray. */
-    int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
+    int32_t record[SIMD_WIDTH]; /* index in kernel_occluders.hexes of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
     kernel_transformed_curved transformed;

@@ -70,7 +70,7 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
     return false;
 }
 
-/* ---- slabs --------------------------------------------------------------------------------------------------- */
+/* ---- rays that meet slabs, which contain the surfaces in cells ------------------------------------------------ */
 
 /* Finds the cells whose slabs a ray meets, and adds the pair of the ray and each of these cells to a list: to the
  * ray-hex pairs if the cell is a hex with a record, and otherwise to the undecided pairs. ray: index of the ray.

@@ -38,7 +38,8 @@ enum { KERNEL_POLYHEDRA = SIMD_WIDTH };
 /* A tile's cells that are queued for tracing, and the state of the tile's search for cells in trees
  * (kernel_tile_surface.h). A thread keeps the struct from tile to tile. */
 typedef struct kernel_tile_search {
-    int layer, part;      /* layer and mesh part of the cells that are being queued; -1: no cell has been queued yet */
+    /* surface layer and mesh part of the cells that are queued next; -1: no cell has been queued yet */
+    int layer, part;
     kernel_arrays arrays; /* coordinates, connectivity and field values of the mesh part `part` */
     kernel_surface_cells pending[KERNEL_LANE_TYPES]; /* one queue per type */
     kernel_batch batch;
@@ -48,7 +49,7 @@ typedef struct kernel_tile_search {
     /* candidates from the tile's bin whose cells' vertex indices are being prefetched */
     int prefetched_count;
     const kernel_tile_candidate *prefetched[SIMD_WIDTH];
-    /* The following members are used by the search. */
+    /* The following members are used by the tile's search for cells in trees. */
     kernel_tile_trace *tile;
     kernel_candidate_list list; /* the cells that have been found and are not queued yet */
     kernel_candidate items[2 * SIMD_WIDTH];

@@ -27,7 +27,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* ---- cells of leaves ---- */
+/* ---- queuing the cells that the search finds ---- */
 
 /* Queues the cells in the list, which the search has found, for tracing, unless nearer hits hide them. Empties the
  * list. It always returns true, as the callback kernel_finder.grow must. */
@@ -47,8 +47,8 @@ static bool kernel_queue_found_candidates(kernel_candidate_list *list)
     return true;
 }
 
-/* Prepares the search for cells of a mesh part, if it is not the current one. Cells of the previous part that the
- * finder has collected are processed first. */
+/* Prepares the search for cells of a mesh part, unless that part is being searched already. Cells of the previous part
+ * that the finder has collected are processed first. */
 static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
@@ -145,8 +145,9 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Tests the nodes by six of the tile's planes and by the surface's isovalues, and computes the results in *nodes.
- * Returns a mask of the lanes whose nodes may be visible. */
+/* Tests which nodes may be visible, by the planes through the tile's four borders, the nodes' depths and the surface's
+ * isovalues, and sets the members near, along and box of *nodes. Returns a mask of the lanes whose nodes may be
+ * visible. */
 SIMD_INLINE unsigned kernel_test_node_visibility(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
     enum { LEFT, RIGHT, TOP, BOTTOM, DEPTH, ALONG, PLANES };

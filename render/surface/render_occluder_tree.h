@@ -1,4 +1,5 @@
-/* Builds the trees of occluders that kernels traverse. */
+/* Builds trees of triangles or slabs, the pieces of surfaces in cells that may block rays from hits
+ * (kernel_occluders.h). */
 #ifndef RENDER_RENDER_OCCLUDER_TREE_H
 #define RENDER_RENDER_OCCLUDER_TREE_H
 

@@ -196,7 +196,7 @@ static double scale_of(const occluder_search *s, double isovalue)
     return kernel_mirrored_power(largest);
 }
 
-/* Computes the rows of the current cell's slab. */
+/* Computes the numbers that are stored for the slab of the current cell (out->rows). */
 static void fill_slab(const occluder_search *s, double isovalue, occluder_piece *out)
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
@@ -225,7 +225,7 @@ static void fill_slab(const occluder_search *s, double isovalue, occluder_piece 
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Stores which vertices are the corners of the hex's faces in its record, in the form of
+/* Stores in the hex's record which of its vertices are the corners of each face, in the form of
  * kernel_transformed_curved.corners. */
 static void fill_faces(const kernel_cell *c, float *record)
 {

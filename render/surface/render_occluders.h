@@ -1,4 +1,4 @@
-/* Builds the trees of kernel_occluders.h for a frame. */
+/* Builds, for a frame, the trees of the cells that may block rays from hits (kernel_occluders.h). */
 #ifndef RENDER_RENDER_OCCLUDERS_H
 #define RENDER_RENDER_OCCLUDERS_H
 
