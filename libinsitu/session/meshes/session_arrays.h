@@ -21,8 +21,8 @@ typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
     int64_t count; /* number of elements that the array must have, not counting the additional one of SESSION_HAS_END */
     int flags;     /* a combination of the SESSION_* bits above */
-    /* number of array elements from one tuple to the next if the caller gives no stride: the number of interleaved
-     * components, or 1 */
+    /* number of array elements from the start of one tuple to the start of the next if the caller gives no stride: the
+     * number of interleaved components, or 1 */
     int per_tuple;
 } session_array_rule;
 
@@ -42,7 +42,8 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
 insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_any_stride,
                                        const char *name, base_error *error);
 
-/* Returns whether both descriptions have the same address, type and stride. */
+/* Returns whether two descriptions of arrays have the same address, element type and stride; two arrays that are not
+ * given are equal. */
 bool session_is_same_array(const insitu_array *a, const insitu_array *b);
 
 #endif

@@ -25,7 +25,8 @@ typedef struct session_catalogue_field {
 /* A hanging vertex: a vertex that lies on a face of a coarser cell without being a corner of this face. Its value is
  * the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
-    int64_t group; /* index of its group of equal vertices (session_vertex_groups) */
+    /* index, in session_vertex_groups, of the group of equal vertices that contains the hanging vertex */
+    int64_t group;
     /* for each corner of the face, the index of its group of equal vertices or, if is_received is set, the index of its
      * value among the values received from other ranks */
     int64_t corners[4];
@@ -49,7 +50,7 @@ typedef struct session_border {
     session_face *faces; /* faces that belong to only one cell of the whole mesh, on all ranks */
     int64_t *vertices; /* vertices of the faces that belong to only one cell of this rank; only these vertices may hang
                           on faces */
-    /* number of twins; the twins are computed again if vertices move (session_hanging.twins_version) */
+    /* number of entries of `twins`, which are computed again if vertices move (session_hanging.twins_version) */
     int64_t twin_count;
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
 } session_border;
@@ -60,12 +61,12 @@ typedef struct session_hanging {
     /* session_mesh_group.positions_hash at the time when this struct was computed; 0: not computed yet */
     uint64_t positions_hash;
     int border_count;
-    session_border *borders; /* one border per part; NULL: not computed yet */
+    session_border *borders; /* outer faces of each of this rank's parts of the meshes; NULL: not computed yet */
     uint64_t twins_version;  /* version of the vertex coordinates for which the twins of the borders were found */
-    int64_t count, total;    /* number of hanging vertices on this rank, and on all ranks together */
+    int64_t count, total;    /* number of hanging vertices on this rank (count), and on all ranks together (total) */
     session_hanging_vertex *vertices; /* the hanging vertices; `count` entries */
-    /* sent_counts: number of values sent to each rank; sent_groups: the groups whose values are sent, sorted by the
-     * rank that receives them */
+    /* sent_counts: number of values that are sent to each rank; sent_groups: indices of the groups of equal vertices
+     * whose values are sent, sorted by the rank that receives them */
     int64_t *sent_counts, *sent_groups;
     int64_t sent_total; /* number of values sent to all ranks together */
 } session_hanging;
@@ -75,28 +76,32 @@ typedef struct session_hanging {
 typedef struct session_vertex_groups {
     /* session_mesh_group.positions_hash at the time when the groups were computed; 0: not computed yet */
     uint64_t positions_hash;
-    /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
+    /* for each part of a mesh, the index of its first vertex in group_of_vertex; a final entry is the number of
+     * vertices of all parts */
     int64_t *first_vertices;
     /* for each vertex of all parts, the index of its group; -1: the vertex belongs to no drawn cell */
     int64_t *group_of_vertex;
     int64_t count; /* number of groups */
-    /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
+    /* prefix sums of the numbers of cell corners in groups: for each group, the number of corners of drawn cells whose
+     * vertices belong to groups before it; count + 1 entries */
     int64_t *corner_starts;
-    session_key_table keys; /* keys of the groups, for the vertices of patches, which are found by key; empty if no mesh
-                               has patches */
+    /* Hash table of the groups' keys: a vertex's global id, or the bits of its coordinates. It is used only for the
+     * caller's values on boundary faces (insitu_patch): if the mesh is discontinuous, the groups of such a face's
+     * vertices are found by their keys. Empty if no mesh has such values. */
+    session_key_table keys;
     /* Groups whose positions lie in other ranks' bounding boxes, sorted by the ranks that combine their values (home
      * ranks, session_homes.h). There are none if there is only one rank. */
     int64_t shared_count;     /* number of groups whose positions lie in other ranks' boxes */
     int64_t *shared_groups;   /* index of each shared group */
     session_key *shared_keys; /* key by which each shared group is found on its home rank */
-    int64_t *shared_counts;   /* for each rank, the number of shared groups that have this home rank */
+    int64_t *shared_counts;   /* for each rank, the number of shared groups whose home rank it is */
 } session_vertex_groups;
 
 typedef struct session_catalogue_mesh {
     char *name;
     int first_rank;  /* lowest rank that has cells of the mesh; -1: there is none */
     bool has_ids;    /* set if all ranks that have cells give global vertex ids */
-    bool is_refined; /* set if some block, on any rank, has a level of refinement */
+    bool is_refined; /* set if a block of the mesh, on any rank, has a level of refinement */
     /* set if all drawn cells, over all ranks, are shells (triangles, quads or polygons); computed by
      * session_check_vertex_order() */
     bool has_shells_alone;
@@ -121,8 +126,9 @@ typedef struct session_catalogue_mesh {
     session_homes homes;
 } session_catalogue_mesh;
 
-/* A set of meshes across which cell values are averaged at equal vertices. It consists of the meshes without vertex ids
- * that have the field of one layer. A mesh with ids is a mesh group by itself. */
+/* A set of meshes across which cell values are averaged at equal vertices. It consists of all meshes without vertex ids
+ * that have the field that one layer of an image shows. A mesh with vertex ids is a mesh group by itself, because ids
+ * are unique only within one mesh. */
 typedef struct session_mesh_group {
     /* hash that identifies the mesh group: scene_field.mesh_group_name, or session_catalogue_mesh.single_group_name */
     uint64_t name;
@@ -130,11 +136,11 @@ typedef struct session_mesh_group {
     session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
-    /* hash of session_catalogue_mesh.positions_hash of all meshes of the mesh group; it changes if coordinates of any
-     * of these meshes change; 0: not computed yet */
+    /* hash of the positions_hash of all meshes of the mesh group; it changes if coordinates of any of these meshes
+     * change; 0: not computed yet */
     uint64_t positions_hash;
-    /* home ranks, if the mesh group has several meshes; for a single mesh, session_catalogue_mesh.homes is used
-     * instead */
+    /* home ranks of vertices and faces, if the mesh group has several meshes; for a single mesh,
+     * session_catalogue_mesh.homes is used instead */
     session_homes own_homes;
     const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
@@ -146,9 +152,9 @@ typedef struct session_catalogue {
     bool has_faults;         /* set if some mesh or field has an error */
     bool are_derived;        /* set if the catalogue contains the derived fields of the current scene */
     bool are_meshes_grouped; /* set if the mesh groups are those of the current scene */
-    bool are_hashes_known;   /* set if the meshes' hashes of cells and positions are up to date */
-    /* error because of which no image can be drawn: it belongs to no known mesh, or memory ran out on some rank; NULL:
-     * there is none */
+    bool are_hashes_known;   /* set if cells_hash and positions_hash of all meshes are up to date */
+    /* an error that belongs to no known mesh, or lack of memory on some rank, because of which no image can be drawn;
+     * NULL: there is no such error */
     base_error *fault;
     int mesh_count, mesh_group_count;
     session_catalogue_mesh *meshes;
@@ -188,7 +194,7 @@ static inline uint64_t session_find_group_name_of_mesh(const session_catalogue_m
 /* Returns the mesh group with this hash as its `name`, or NULL if there is none. */
 session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name);
 void session_drop_mesh_groups(session_catalogue *catalogue);
-/* Frees the data of the hanging vertices and, if with_borders is set, the borders. */
+/* Frees the data of the hanging vertices and, if with_borders is set, the lists of outer faces (session_border). */
 void session_hanging_free(session_hanging *hanging, bool with_borders);
 
 /* This rank's parts of the meshes of a mesh group, sorted by mesh. */
@@ -207,8 +213,8 @@ void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 
-/* Returns a hash of this rank's table of meshes and fields (session_catalogue.c). Two ranks have the same hash if their
- * tables are equal. Local. */
+/* Returns a hash of this rank's table of meshes and fields, a text with their names and properties
+ * (session_catalogue.c). Two ranks with equal tables have equal hashes. Local. */
 uint64_t session_hash_names(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. derived: index of the field

@@ -12,8 +12,8 @@
  * indices starts[s] .. starts[s + 1] - 1. */
 typedef struct session_derivatives {
     int axis_count; /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
-    /* distance between the first two nodes of an edge of length 1, by which equispaced nodes are distinguished from
-     * Gauss-Lobatto points */
+    /* distance between the first two nodes of an edge of length 1; it differs between equispaced nodes and
+     * Gauss-Lobatto points, and is used to distinguish them */
     double first_segment;
     int *starts;
     int *nodes;      /* for each term, the position of its node in the cell's list of nodes in the connectivity */
@@ -37,23 +37,26 @@ bool session_may_have_lobatto_nodes(const session_nodes *of);
 void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
 
 /* Finds the directions from a node that a serendipity cell lacks to the nodes around it. at: lattice indices of the
- * missing node. Returns the number of directions: 2 at the middle of a face, 3 at the middle of a hex. */
+ * missing node. directions: receives vectors d of lattice indices; the nodes around the missing node are at its indices
+ * plus sums of the vectors multiplied by -1, 0 or 1. Returns the number of directions: 2 at the middle of a face, 3 at
+ * the middle of a hex. */
 int session_find_missing_node_directions(int type, const int at[3], int directions[3][3]);
 
 /* The derivatives of the polynomials of all cells of a mesh whose cells of higher order are split into linear
  * pieces. */
 typedef struct session_polynomials {
     session_rows rows;
-    const int64_t *first_pieces; /* same as session_topology.first_pieces */
-    int64_t cell_count;          /* number of the caller's cells */
+    /* for each of the caller's cells, the index of its first linear piece (session_topology.first_pieces) */
+    const int64_t *first_pieces;
+    int64_t cell_count; /* number of the caller's cells */
     insitu_vertex_order order;
-    /* Two entries for each kind of cell. Without finer lattices: the derivatives for equispaced nodes, and those for
-     * Gauss-Lobatto points. With finer lattices: the derivatives at the nodes of refined cells, and those at the nodes
-     * of all other cells. */
+    /* Two entries for each kind of cell k: kinds[2 k] and kinds[2 k + 1]. If the mesh has no finer lattices, these are
+     * the derivatives for equispaced nodes and those for Gauss-Lobatto points. Otherwise they are the derivatives at
+     * the nodes of refined cells and those at the nodes of all other cells. */
     session_derivatives *kinds;
-    /* If the mesh has finer lattices: `nodal` gives access to the nodes of the caller's cells, and its list of kinds
-     * has the same order as `kinds`; refined_counts has the number of nodes of a refined cell of each kind. Otherwise
-     * the list of kinds in `nodal` is empty. */
+    /* If the mesh has finer lattices, `nodal` gives access to the caller's nodes of each cell, kind k of nodal.kinds is
+     * the k of `kinds` above, and refined_counts[k] is the number of nodes that a refined cell of this kind has in its
+     * finer lattice. Otherwise nodal.kind_count is 0. */
     session_rows nodal;
     int64_t refined_counts[ROWS_MOST_KINDS];
 } session_polynomials;

@@ -9,7 +9,7 @@
 
 /* Callback that computes the size of a pixel in the views that show a mesh. */
 typedef struct session_pixels {
-    const void *of; /* the state that is passed to size() */
+    const void *of; /* first argument of the callback size() */
     /* Returns a lower bound of the size of a pixel at any point of a sphere, in units of coordinates; INFINITY if no
      * view shows the sphere. It is called by several threads at once. */
     double (*size)(const void *of, const double centre[3], double radius);
@@ -49,13 +49,15 @@ typedef struct session_deviation_request {
     const unsigned char *measured;
 } session_deviation_request;
 
-/* Computes the component of the field that is measured, or the distance from the request's plane if no field is given,
- * at the `count` nodes of a cell. rows: rows of the caller's cells. tuple: buffer for all components of the field. */
+/* Computes the values at the `count` nodes of a cell: the component of the request's field or, if the request has no
+ * field, the signed distances from its plane. rows: access to the caller's cells. tuple: buffer for all components of
+ * the field at one node. out: receives one value per node. */
 void session_read_request_values(const session_rows *rows, const session_deviation_request *request, int64_t cell,
                                  int count, double *tuple, double *out);
 
 typedef struct session_deviation {
-    double error; /* largest error bound of a cell, in pixels, if there is one piece between two nodes */
+    /* largest error bound of all measured cells, in pixels, for cells that are split only between their own nodes */
+    double error;
     /* cell_count: number of cells that an isosurface may cross. unbounded_count: number of these cells whose bound was
      * replaced by a smaller limit, because their nodes are too far apart to resolve the isosurface */
     int64_t cell_count, unbounded_count;
@@ -64,8 +66,9 @@ typedef struct session_deviation {
     double low, high; /* if is_of_values: the range of the values at nodes */
 } session_deviation;
 
-/* Measures the caller's cells of a mesh with cells of higher order, except ghosts. Combines the result with the results
- * of earlier calls in *out, and sets the marks of the request. Parallel. Local. */
+/* Measures the caller's cells of a mesh with cells of higher order, except ghosts, and sets the marks of the request.
+ * *out contains the results of earlier calls: maxima, minima and sums in it are extended by the cells of this mesh.
+ * Parallel. Local. */
 insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
                                         session_deviation *out, base_error *error);
 

@@ -16,12 +16,12 @@
  * done before the catalogue is updated. Local. */
 void session_drop_vertex_ids(const session_meshes *meshes);
 
-/* Maximum number of parts of an edge between two nodes. Lattices have at most the order NODES_MOST_ORDER, which limits
- * cells of order 3 and more further. */
+/* Maximum number of parts into which an edge between two neighbouring nodes is cut. The number is smaller for cells of
+ * order 3 and more, because their finer lattices have at most the order NODES_MOST_ORDER. */
 enum { FINER_MOST_PARTS = 12 };
 
-/* Size of finer lattices in bytes. own: size of their pieces and nodes; per_component: size of the values of one
- * component of a field at the nodes. */
+/* Size of finer lattices in bytes. own: size of the linear pieces and of the nodes' coordinates; per_component: size of
+ * one component of a field at all nodes. */
 typedef struct session_finer_bytes {
     int64_t own, per_component;
 } session_finer_bytes;
@@ -35,7 +35,7 @@ typedef struct session_cell_marks {
 /* Counts of a mesh's cells of higher order over all ranks, and the chosen number of parts between two nodes of an edge.
  * All members except the marks are the same on every rank. */
 typedef struct session_finer_choice {
-    int order; /* highest order of its cells; 0: no rank has cells of higher order */
+    int order; /* highest order of the mesh's cells on all ranks; 0: no rank has cells of higher order */
     int64_t serendipity_count, shell_count;
     int64_t excluded_count; /* number of pyramids of an order above INTERPOLATION_MOST_PYRAMID; a mesh with such
                                pyramids cannot have finer lattices */
@@ -46,15 +46,17 @@ typedef struct session_finer_choice {
     /* used if `parts` is 1: set by the caller if nodes are added to serendipity cells, so that they have all nodes of
      * their order */
     bool is_completed;
-    /* number of elements of `marks`, one for each part of the mesh on this rank; 0: all cells are refined */
+    /* number of elements of `marks`: the number of parts of the mesh on this rank; 0: there are no marks, and all cells
+     * are refined */
     int mark_count;
-    session_cell_marks *marks; /* marks for each part of the mesh on this rank */
+    session_cell_marks *marks; /* marks of refined cells for each part of the mesh on this rank */
 } session_finer_choice;
 
 /* Frees the choices of `count` meshes. */
 void session_free_choices(session_finer_choice *choices, int count);
 
-/* Returns the maximum number of parts into which the mesh's edges between two nodes can be cut. */
+/* Returns the maximum number of parts into which an edge between two neighbouring nodes can be cut in all cells of the
+ * mesh. */
 int session_find_max_edge_parts(const session_finer_choice *choice);
 
 /* Counts the cells of higher order of each mesh of the catalogue, and sets `parts` to 1. Meshes must have been checked
@@ -86,25 +88,25 @@ insitu_status session_make_finer_lattices(session_meshes *meshes, const session_
                                           session_finer_choice *choices, const session_team *team, bool *are_changed,
                                           base_error *error);
 
-/* Makes one mesh read the caller's cells again instead of finer lattices. Local. */
+/* Frees the finer lattices of one mesh. The session then reads the caller's cells of this mesh again. Local. */
 void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh);
 
-/* Makes all meshes read the caller's cells and vertex ids again. Local. */
+/* Frees the finer lattices of all meshes. The session then reads the caller's cells and vertex ids again. Local. */
 void session_end_finer_lattices(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */
 typedef struct session_node_values {
     const void *of; /* the state that is passed to read() */
-    /* set if `position` is the index of an entry of connectivity, where unused entries are not counted; otherwise it is
-     * the index of a vertex */
+    /* true: the argument `position` of read() is the index of an entry of the connectivity, where unused entries are
+     * not counted; false: it is the index of a vertex */
     bool is_by_entry;
     int component_count; /* number of components of a tuple */
     /* reads the tuple of values at one node */
     void (*read)(const void *of, int64_t position, double *tuple);
 } session_node_values;
 
-/* Computes the tuples at all nodes of a mesh's finer lattices from the values at the nodes of the caller's cells. `out`
- * receives them in the order of the vertices of session_finer.fine. Local. */
+/* Computes the tuples of values at all nodes of a mesh's finer lattices from the values at the nodes of the caller's
+ * cells. `out` receives one tuple for each vertex of session_finer.fine, in the order of these vertices. Local. */
 insitu_status session_interpolate_values(const session_mesh *mesh, const session_node_values *values, int threads,
                                          double *out, base_error *error);
 

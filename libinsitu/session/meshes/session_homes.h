@@ -27,7 +27,7 @@ typedef struct session_box {
 
 /* The data by which a rank finds the homes of items of one or several meshes. */
 typedef struct session_homes {
-    bool is_computed; /* set if the other members are up to date */
+    bool is_computed; /* set if all other members of the homes are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
     int rank;         /* this rank */
     /* The ranks near this rank, including this rank, in ascending order: ranks whose bounding box of drawn cells
@@ -46,9 +46,10 @@ typedef struct session_homes {
 
 void session_homes_free(session_homes *homes);
 
-/* Computes the homes. meshes: this rank's parts; an entry is NULL if this rank has no part of that mesh. Several meshes
- * are treated as one. by_id is allowed only for a single mesh. half_diagonal: half of the diagonal of the scene's
- * bounds. Collective; all ranks return the same status. */
+/* Computes the data by which the homes of the vertices and faces of one or several meshes are found. meshes: this
+ * rank's `count` parts of these meshes; an entry is NULL if this rank has no part of that mesh. by_id is allowed only
+ * for a single mesh. half_diagonal: half of the diagonal of the scene's bounds. Collective; all ranks return the same
+ * status. */
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 

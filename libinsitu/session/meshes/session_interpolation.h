@@ -15,15 +15,20 @@ enum { INTERPOLATION_SIDES = 3, INTERPOLATION_MOST_SIDES = 12 };
  * listed in several orders, which begin at each of its corners and follow the face in either direction; those of an
  * edge in two orders. */
 typedef struct session_interpolation_sides {
-    int corner_count; /* of a face: 4 or 3; of an edge: 2 */
+    int corner_count; /* number of corners: 4 for a quad, 3 for a triangle, 2 for an edge */
     int count;        /* number of these faces or edges of the cell */
     int turn_count;   /* number of orders in which the nodes of a face or edge can be listed */
-    /* number of nodes of one such face or edge, in the cell's lattice (node_count) and in the finer one (fine_count) */
+    /* number of nodes on one such face or edge in the lattice of the complete cell (node_count) and in the finer
+     * lattice (fine_count) */
     int node_count, fine_count;
     /* for each face or edge, the indices of its corners among the cell's corners, in order around it */
     signed char corners[INTERPOLATION_MOST_SIDES][4];
-    int *nodes;      /* for each face or edge and each order, the indices of its nodes in `complete` */
-    int *fine_nodes; /* for each face or edge and each order, the indices of its finer nodes in `fine` */
+    /* node_count entries for each face or edge and each order of listing: indices of its nodes in the lattice of the
+     * complete cell (session_interpolation.complete) */
+    int *nodes;
+    /* fine_count entries for each face or edge and each order of listing: indices of its nodes in the finer lattice
+     * (session_interpolation.fine) */
+    int *fine_nodes;
 } session_interpolation_sides;
 
 /* The interpolation in cells of one type with one number of nodes. */
@@ -31,8 +36,8 @@ typedef struct session_interpolation {
     session_nodes of;       /* the cell's own nodes */
     session_nodes complete; /* all nodes of a complete cell of the same order */
     session_nodes fine;     /* the nodes of the finer lattice, which are equispaced */
-    /* For each node of `complete`, in lexicographic order: its position in the cell's list of nodes in the
-     * connectivity. A position of at least of.count marks a node that a serendipity cell lacks. */
+    /* For each node of the complete cell, in lexicographic order: its position in the cell's list of nodes in the
+     * connectivity. A position of at least of.count means that a serendipity cell lacks the node. */
     int *positions;
     int corners[8]; /* for each corner, in VTK's order, its position in the cell's list of nodes in the connectivity */
     /* matrix that gives the values at the finer nodes of an edge (rows) from those at the edge's nodes (columns) */
@@ -40,17 +45,19 @@ typedef struct session_interpolation {
     /* matrix that gives the values at the finer nodes of a triangle (rows) from those at the triangle's nodes
      * (columns), for triangular faces and the layers of wedges; NULL for hexes and quads */
     double *triangle;
-    /* for tets and pyramids: matrix that gives the values at all nodes of `fine` (rows) from those at all nodes of
-     * `complete` (columns) */
+    /* for tets and pyramids: matrix that gives the values at all nodes of the finer lattice (rows) from those at all
+     * nodes of the complete cell (columns); NULL for all other types */
     double *whole;
-    /* faces and edges: quads, triangles, edges, in this order */
+    /* tables of the cell's quads ([0]), triangles ([1]) and edges ([2]) */
     session_interpolation_sides sides[INTERPOLATION_SIDES];
     int own_count; /* number of the cell's own nodes that coincide with a node of the finer lattice */
-    int (*own)[2]; /* for each such node of the cell, its index in `complete` and the index in `fine` */
+    /* for each of these own_count nodes: its index in the complete cell ([0]), and the index of the coinciding node of
+     * the finer lattice ([1]) */
+    int (*own)[2];
 } session_interpolation;
 
-/* Largest order of pyramids that can be interpolated. It is limited because a matrix with one row and one column per
- * node of the pyramid is inverted. */
+/* Largest order of pyramids that can be interpolated. The order is limited because a matrix with one row and one column
+ * per node of the pyramid is inverted to set up the interpolation. */
 enum { INTERPOLATION_MOST_PYRAMID = 6 };
 
 /* Finds the interpolation from the nodes of a type and order of cells (`of`) to a lattice of the order parts *
@@ -62,17 +69,19 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
-/* Fills in only the members that session_complete_tuples() needs, without fine nodes and weights. Returns false if
- * memory runs out. */
+/* Fills in only those members of *out that session_complete_tuples() needs; members for the finer lattice remain empty.
+ * Returns false if memory runs out. */
 bool session_map_nodes_to_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
 
 /* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order
- * p whose upper face is collapsed to the apex. A pyramid's functions are polynomials of order p along each axis of that
- * hex. Returns NULL if memory runs out; the caller must free the result by base_free(). */
+ * p whose upper face is collapsed to the apex. With this matrix, a pyramid can be treated as a hex, because the
+ * pyramid's basis functions are polynomials of order p along each axis of the hex. Returns NULL if memory runs out; the
+ * caller must free the result by base_free(). */
 double *session_compute_collapse_matrix(int p);
 
-/* Copies tuples at the cell's nodes, which are in the order of the nodes in connectivity, into the order of `complete`,
- * and computes the tuples at nodes that a serendipity cell lacks. */
+/* Copies the tuples at the cell's nodes from the order of the nodes in the connectivity into lexicographic order, and
+ * computes the tuples at nodes that a serendipity cell lacks. `out` has one tuple for each node of the complete
+ * cell. */
 void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);
 
 /* Returns the number of doubles that session_interpolate() needs as working memory. */

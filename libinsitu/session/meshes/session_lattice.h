@@ -17,8 +17,8 @@ bool session_has_axes(const insitu_mesh *mesh);
  * INSITU_CHANGED_ALL if their shapes differ, so that the mesh counts as a new one. */
 unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *b);
 
-/* Copies the lattice of the description, if it has one, into the mesh, and makes given.lattice point to the copy.
- * Local. */
+/* Copies the lattice of the caller's description, if it has one, into mesh->lattice, and makes mesh->given.lattice
+ * point to the copy. Local. */
 void session_copy_lattice(session_mesh *mesh);
 
 /* If the mesh has a lattice, makes its grid compute the vertices of cells from the lattice: sets the cell type, the

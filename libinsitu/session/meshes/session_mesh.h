@@ -55,13 +55,14 @@ typedef struct session_field {
  * values. */
 typedef enum session_extent_kind {
     SESSION_SEEN, /* all drawn cells that have only finite values */
-    /* as SESSION_SEEN, but the minimum is taken only over cells all of whose values are positive */
+    /* the same cells as SESSION_SEEN for the maximum; for the minimum, only those of them all of whose values are
+     * positive */
     SESSION_POSITIVE,
     SESSION_SOLID, /* as SESSION_SEEN, but without shells */
     SESSION_EXTENTS
 } session_extent_kind;
 
-/* Minimum and maximum of a scalar's values; low > high means that there are no values. */
+/* Minimum and maximum of a scalar's values over a set of cells; low > high means that the set has no values. */
 typedef struct session_extremes {
     bool is_known; /* set if low and high are up to date */
     double low, high;
@@ -91,14 +92,15 @@ typedef struct session_scalar {
     int64_t computed_count;  /* number of times that the values have been computed */
     uint64_t positions_hash; /* session_mesh_group.positions_hash at the time when the values were computed */
     bool is_used;            /* set if an image of this step uses the scalar */
-    /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
+    /* set if an image of this step needs the minimum and maximum of the scalar in each node of the tree; scalars that
+     * only give colours do not need them */
     bool needs_ranges;
     bool needs_all_cells; /* set if an image of this step may show any cell, whatever its values are */
     /* Intervals of values that this step's images show; not used if needs_all_cells is set. Images need only cells
      * whose range of values intersects an interval. */
     int interval_count;
     mmbvh_interval *intervals;
-    session_plane plane; /* the plane from which distances are computed */
+    session_plane plane; /* the plane from which the vertices' distances are computed, if field is -1 */
     /* signed distance of each vertex from the plane; NULL: not computed yet. insitu_report lists them as a copy */
     float *distances;
     /* cell values recentred to vertices; NULL: not computed yet. insitu_report lists them as a copy */
@@ -116,10 +118,15 @@ typedef struct session_scalar {
     uint64_t checksum;        /* checksum of all values when they were last compared */
     uint64_t sample_checksum; /* checksum of a few of the values, to detect changes that the caller does not declare */
     int64_t version;          /* number of times that a checksum has shown that the values have changed */
-    bool has_own_ranges;      /* set if the ranges are stored in the tree's nodes, and not in node_ranges */
-    float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
-    bool are_ranges_stale;    /* set if the ranges in the tree were computed for other values */
-    /* number of drawn cells with a value that is not finite; a split cell counts once per piece */
+    /* set if the minimum and maximum of each node of the tree are stored in the tree itself, and not in node_ranges */
+    bool has_own_ranges;
+    /* two numbers per node of the bounding volume hierarchy: minimum and maximum of the values in the node; NULL: not
+     * computed yet */
+    float *node_ranges;
+    /* set if the minimum and maximum of the tree's nodes were computed for earlier values */
+    bool are_ranges_stale;
+    /* number of drawn cells that have a value that is not finite; a cell that is split into pieces is counted once for
+     * each piece */
     int64_t unusable_count;
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
@@ -135,7 +142,7 @@ struct session_mesh;
 /* The cells whose values of a scalar lie within bounds. If the field is at vertices, the values of all vertices of the
  * cell must lie within them. */
 typedef struct session_threshold {
-    bool is_given; /* if not set, all cells are selected */
+    bool is_given; /* false: there is no threshold, and all cells are selected */
     int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is selected */
     int component; /* index of the component, or -1 for the magnitude (grid_field.component) */
     double low, high;
@@ -148,13 +155,13 @@ typedef struct session_outer {
     session_threshold threshold;
     /* session_scalar.version of the values to which the threshold was applied, if there is a threshold */
     int64_t version;
-    bool is_needed;       /* set if an image of this step needs it */
+    bool is_needed;       /* set if an image of this step needs the outer surface */
     bool are_faces_known; /* set if `faces` is up to date for the current cells */
     int64_t face_count;
     session_face *faces; /* outer faces, sorted by cell */
     /* the mesh built on the faces, which has the name of the whole mesh; NULL: not built yet */
     struct session_mesh *mesh;
-    double *coordinates; /* 3 coordinates per vertex of the mesh */
+    double *coordinates; /* three coordinates for each vertex of the mesh that is built on the outer faces */
     int64_t *connectivity, *offsets;
     unsigned char *types;
     int64_t *loops; /* outlines of polygons for edge lines, in the format of render_part.loops */
@@ -164,10 +171,11 @@ typedef struct session_outer {
     int64_t bytes; /* size of all arrays of the outer surface in bytes */
 } session_outer;
 
-/* Arrays owned by the session that are read instead of the caller's arrays (session_topology.h). They are computed once
- * per topology. insitu_report lists them as copies. */
+/* Arrays of cells and faces that are owned by the session and read instead of the caller's (session_topology.h). They
+ * are kept until the cells that the session reads change. insitu_report lists them as copies. */
 typedef struct session_topology {
-    /* set if the arrays match the current cells, even if nothing had to be computed */
+    /* set if the arrays below match the caller's current cells, even if all of the caller's arrays can be read and
+     * nothing had to be computed */
     bool is_made;
     /* set if the member `connectivity` below is read instead of the caller's, while the offsets and types are the
      * caller's */
@@ -178,8 +186,9 @@ typedef struct session_topology {
     grid_array offsets, connectivity;
     unsigned char *cell_types; /* type of each cell; NULL: all cells have the type cell_type */
     int cell_type;
-    bool has_own_faces;                         /* set if the faces below are read instead of the caller's faces */
-    grid_array face_offsets, face_connectivity; /* faces of the cells; empty if there are no polyhedra */
+    bool has_own_faces; /* set if the faces below are read instead of the caller's faces */
+    /* offsets and vertices of the faces of polyhedra; empty if there are no polyhedra */
+    grid_array face_offsets, face_connectivity;
     /* number of entries of the arrays that are read, whether these are the caller's or the session's */
     int64_t connectivity_count, face_connectivity_count;
     int64_t cell_bytes, face_bytes;
@@ -207,14 +216,16 @@ typedef struct session_discontinuous {
     bool are_corners_entries;
     int64_t corner_count;
     grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
-    /* connectivity of the discontinuous mesh: for each entry of the connectivity that is read, the index of its corner.
-     * If cells are not split, this is a permutation that is its own inverse. */
+    /* connectivity of the discontinuous mesh: for each entry of the connectivity that is read, the index of its corner,
+     * which is also the index of the corner's own vertex. If cells are not split, this is a permutation that is its own
+     * inverse. */
     grid_array corners;
     grid_array coordinates[3];
     int64_t bytes;
 } session_discontinuous;
 
-/* Bounds, counts and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
+/* Bounds and numbers of the drawn cells of a mesh, and the sum of their sizes; each member is described at the member
+ * of session_mesh with the same name. */
 typedef struct session_sizes {
     double lower[3], upper[3];
     int64_t drawn_count, flat_count;
@@ -226,7 +237,7 @@ typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* Selects the linear pieces of cells of higher order that are made. Pieces that are not selected are not drawn. */
+/* A set of linear pieces of cells of higher order. Only the pieces in the set are made and drawn. */
 typedef struct session_piece_set {
     /* for each cell, the index of its first word in `bits`; a final entry marks the end. If a cell has no words, all of
      * its pieces are made. NULL: all pieces of all cells are made */
@@ -242,21 +253,26 @@ enum { SESSION_FINER_COUNTS = 64 };
  * insitu_report lists them as a copy. */
 typedef struct session_finer {
     bool is_counted; /* set if `counts` were computed for the current cells */
-    /* counts of the mesh's cells of higher order; an enumeration in session_finer.c names the elements */
+    /* numbers of the mesh's cells of higher order by order and class; the first enumeration in session_finer.c says
+     * what each element is */
     int64_t counts[SESSION_FINER_COUNTS];
     int parts; /* number of parts into which each segment between two nodes of an edge is divided; 0: the mesh has no
                   finer lattices, and session_mesh.given is the caller's mesh */
-    /* bounds, sizes and counts that the mesh would have without finer lattices */
+    /* bounds, sum of sizes and numbers of cells that the mesh would have if cells were split only between their own
+     * nodes */
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces; /* the pieces of refined cells that are made */
     /* for each of the caller's cells, a bit mask in which bit f is set if session_shape.faces[f] is an outer face
      * (session_outer_cells.h); NULL: not computed */
     unsigned char *outer_faces;
-    bool is_lobatto;     /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
-    insitu_mesh nodal;   /* the caller's mesh, in which copies replace the arrays that cannot be read in place */
-    insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */
-    double *coordinates; /* 3 coordinates per node of the finer lattices */
+    bool is_lobatto; /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
+    /* the caller's description of the mesh, in which copies replace the arrays that cannot be read in place */
+    insitu_mesh nodal;
+    /* description of the finer cells as a mesh, a copy of session_mesh.given: each cell has its own nodes, which are in
+     * lexicographic order */
+    insitu_mesh fine;
+    double *coordinates; /* three coordinates for each node of the finer lattices */
     int64_t *offsets;    /* offsets of the finer cells; NULL if all cells have the same type and order */
     unsigned char *types;
     int64_t bytes;
@@ -280,14 +296,14 @@ typedef struct session_warp {
     uint64_t key;                /* hash of the displacements by which the coordinates were moved */
     char *coordinate_memory;     /* memory of the moved coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the moved coordinates; an axis has no data if its coordinates are the caller's */
-    insitu_array unmoved[3];     /* session_mesh.given.coordinates before the vertices were moved */
+    insitu_array unmoved[3];     /* the coordinates that session_mesh.given had before the vertices were moved */
     /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
     insitu_lattice lattice;
     int64_t bytes;
     base_error problem; /* the reason why the vertices could not be moved; the check of the mesh returns it */
 } session_warp;
 
-/* Coordinates of a mirror image (session_mirror.h). insitu_report lists computed coordinates as a copy. */
+/* Coordinates of a mirror image of a mesh (session_mirror.h). insitu_report lists them as a copy. */
 typedef struct session_mirrored {
     /* for each axis along which the source mesh is mirrored, the coordinate of the mirror plane */
     double planes[3];
@@ -297,7 +313,8 @@ typedef struct session_mirrored {
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice in the mirror image's description */
     int64_t bytes;
-    /* cells_stamp and coordinates_stamp of the source mesh when the mirror image was made */
+    /* the values that cells_stamp and coordinates_stamp of the source mesh had when the mirror image was made or
+     * updated last */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -321,11 +338,11 @@ typedef struct session_level_box {
     int64_t lower[3], upper[3], refinement[3];
 } session_level_box;
 
-/* Describes a finer block that covers only part of a cell of this block, which is an error. */
+/* Describes an error of a block with a level of refinement: a finer block covers only part of one of its cells. */
 typedef struct session_misfit {
     bool exists; /* set if a finer block covers only part of a cell; the other members then describe this block */
     int axis;    /* axis along which the finer block ends within the cell */
-    /* number of the finer block (session_mesh.block), and its refinement along the axis */
+    /* session_mesh.block of the finer block, and its refinement along the axis */
     int64_t block, refinement;
     int rank; /* rank that has the finer block */
 } session_misfit;
@@ -379,7 +396,8 @@ typedef struct session_mesh {
     session_counts given_counts; /* counts of the caller's cells */
     /* true if all drawn cells of the mesh are shells, on all ranks (session_catalogue_mesh.has_shells_alone) */
     bool has_shells_alone;
-    double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
+    /* sum of the cube roots of the volumes of the drawn cells, from which the mean size of cells is computed */
+    double size_sum;
     uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
     /* hash that identifies the mesh group of this mesh alone (session_catalogue_mesh.single_group_name) */
@@ -393,11 +411,11 @@ typedef struct session_mesh {
      * (plan/session_candidates.h). A partial tree can be used until candidates_key, values, cells or coordinates
      * change. A tree over all drawn cells is called full. */
     bool is_partial;
-    /* set if the tree is full, but its nodes' bounds were refitted only for the candidates */
+    /* set if the tree contains all drawn cells, but the bounds of its nodes were refitted only for the candidates */
     bool are_bounds_partial;
     double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
-    /* number of steps that have used the full tree that was built last; 0: no full tree was built yet */
+    /* number of steps that have used the tree over all drawn cells since it was built; 0: no such tree was built yet */
     int full_tree_steps;
     /* seconds spent on partial trees since the cells last changed, minus the estimated time that refits of a full tree
      * would have taken. If they exceed the estimated time of building a full tree, a full tree is built. */
@@ -411,7 +429,8 @@ typedef struct session_mesh {
 
 /* The caller's fill function that is running (session_filled.h). */
 typedef struct session_filling {
-    const char *mesh, *field; /* names of the mesh and the field that it fills; NULL: no fill function is running */
+    /* names of the mesh and the field that the running fill function fills; NULL: no fill function is running */
+    const char *mesh, *field;
     /* error of the first call to this session that the fill function made; such calls are refused */
     base_error refused_error;
 } session_filling;
@@ -503,8 +522,8 @@ typedef struct session_parts {
     session_mesh **items;
 } session_parts;
 
-/* Returns the description of a mesh in which cells have only the caller's nodes, even if finer lattices are read
- * instead. */
+/* Returns the description of a mesh in which cells of higher order have the caller's nodes, even if the session reads
+ * finer lattices instead. */
 static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 {
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
@@ -556,11 +575,11 @@ void session_drop_axes(session_lattice *lattice);
 void session_drop_conformed(session_conformed *conformed);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
-/* Frees the session's copies of the field's tables of patches and components. */
+/* Frees the session's copies of the tables insitu_field.patches and insitu_field.components. */
 void session_drop_field_tables(session_field *field);
 /* Frees the data that depends on a mesh's cells, because the cells have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
-/* Marks the coordinates of the vertices as changed, while the cells' connectivity is unchanged. */
+/* Marks the coordinates of a mesh's vertices as changed. The cells' connectivity must be unchanged. */
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
 /* Frees the moved coordinates, which must not be in use any more. */
 void session_drop_warp(session_mesh *mesh);
@@ -661,8 +680,9 @@ void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 /* Puts the meshes that the step has excluded back into the list. */
 void session_restore_excluded(session_meshes *meshes);
 
-/* Refuses a public call that is made inside a fill function, because the call would change data that the step reads.
- * Returns whether it was refused; the error is stored in filling.refused_error, and the step fails with it. Local. */
+/* Refuses a public call of the library that the caller's fill function makes, because the call would change data that
+ * the step reads. call: name of the called function. Returns whether the call was refused; the error is stored in
+ * filling.refused_error, and the step fails with it. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
 /* Returns whether cells are described by the owners of their faces. */
@@ -671,7 +691,7 @@ static inline bool session_has_owners(const insitu_mesh *mesh)
     return mesh->owner.data || mesh->boundary_owner.data;
 }
 
-/* Returns whether the mesh is a block that has a level of refinement. */
+/* Returns whether the mesh is a block with cells and with a level of refinement. */
 static inline bool session_has_levels(const insitu_mesh *mesh)
 {
     const insitu_lattice *l = mesh->lattice;

@@ -10,16 +10,16 @@
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
                                base_error *error);
 
-/* Stores a description, which must be correct, in the table. An error can only be lack of memory; the caller must then
- * refuse the mesh. Local. */
+/* Stores a valid description of a mesh in the table of meshes. The only possible error is lack of memory; the calling
+ * function must then refuse the mesh. Local. */
 void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error);
 
 /* Returns whether the mesh is allowed to lack z coordinates, because its cells are, or may be, shells in the plane z =
  * 0. */
 bool session_may_lack_z(const insitu_mesh *mesh);
 
-/* Fails with the status and message of `what`, with the mesh's name and, unless `field` is NULL, the field's name
- * before the message. Returns the status. */
+/* Stores the error `what` in *error, and puts the mesh's name and, unless `field` is NULL, the field's name before its
+ * message. Returns the error's status. */
 insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

@@ -14,7 +14,7 @@ enum { NODES_MOST_ORDER = 32 };
  * 15 or 20 nodes) has only its corners and the midpoints of its edges. */
 typedef struct session_nodes {
     int type;  /* GRID_* type of the linear cell with the same corners */
-    int order; /* 1: the cell is linear */
+    int order; /* polynomial order; 1: the cell is linear */
     int count; /* number of nodes of the cell */
     bool is_complete;
     bool is_lagrange; /* set if the caller's type is INSITU_LAGRANGE_* */
@@ -26,15 +26,15 @@ int session_corner_type(int type);
 /* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
 bool session_is_lagrange(int type);
 
-/* Describes the cell of this type, which must not be linear, that has `count` nodes. Returns false if no order of the
- * type has this number of nodes. */
+/* Finds the order of a cell of higher order from its type and its number of nodes, and describes its nodes in *out.
+ * Returns false if cells of this type have no order with this number of nodes. */
 bool session_describe_nodes(int type, int64_t count, session_nodes *out);
 
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
 int session_lagrange_type(int corner_type);
 
-/* Returns the description of a complete cell: it has the shape of a linear type, and all nodes of a lattice of this
- * order. */
+/* Describes a complete cell of this order: a cell with all nodes of its lattice. corner_type: the linear type with the
+ * same corners. */
 session_nodes session_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
@@ -49,14 +49,16 @@ const char *session_describe_unsupported_node_order(const session_nodes *of, ins
  * and j than the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
-/* Finds the position of each corner in the cell's row of connectivity. Corners are in VTK's order. */
+/* Finds the position of each corner in the cell's list of nodes in the connectivity. out: one position per corner, with
+ * corners in VTK's order. */
 void session_find_corners(const session_nodes *of, insitu_vertex_order order, int out[8]);
 
 /* Returns whether the lattice of the cell's order has a node with the indices i, j, k; each index must be in 0 ..
  * order. */
 bool session_has_node(const session_nodes *of, int i, int j, int k);
 
-/* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */
+/* For cells of order 2: returns the position, in the cell's list of nodes in the connectivity, of the node that has the
+ * index n in VTK's order. */
 int session_convert_quadratic_node_index(const session_nodes *of, insitu_vertex_order order, int n);
 
 /* Returns the number of nodes of each cell of a mesh of one type, or 0 if the description does not determine it. */

@@ -6,11 +6,11 @@
 
 #include "session_nodes.h"
 
-/* PATTERN_MOST_LOOSE: maximum number of pieces of a serendipity cell; PATTERN_MOST_POLYGONS: maximum number of polygons
- * by which it is split. */
+/* PATTERN_MOST_LOOSE: maximum number of pieces into which a serendipity cell is split; PATTERN_MOST_POLYGONS: maximum
+ * number of polygons along which it is split (pattern_polygon). */
 enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
 
-/* A polygon by which a serendipity cell is split; its vertices are midpoints of the cell's edges. Each corner of the
+/* A polygon along which a serendipity cell is split; its vertices are midpoints of the cell's edges. Each corner of the
  * cell is cut off by one polygon (in a quad, by a line of two vertices), and one polygon remains of each face. */
 typedef struct pattern_polygon {
     int count;  /* number of vertices: 2, 3 or 4 */
@@ -23,12 +23,13 @@ typedef struct pattern_polygon {
 typedef struct session_pattern {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
-    /* piece_count: number of listed pieces; piece_size: number of entries of `piece_positions` */
+    /* piece_count: number of listed pieces, 0 for serendipity cells; piece_size: number of entries of
+     * `piece_positions`, the sum of the pieces' numbers of vertices */
     int piece_count, piece_size;
     unsigned char *types; /* GRID_* type of each listed piece */
     /* vertices of the pieces, one piece after the other, as positions in the cell's list of nodes */
     int *piece_positions;
-    int polygon_count; /* number of polygons of a serendipity cell; 0 for all other cells */
+    int polygon_count; /* number of polygons along which a serendipity cell is split; 0 for all other cells */
     pattern_polygon polygons[PATTERN_MOST_POLYGONS];
     int midpoint_count;
     int midpoints[12]; /* positions of the nodes in the middle of edges, in the cell's list of nodes */

@@ -7,9 +7,9 @@
 
 #include "session_deviation.h"
 
-/* Makes the sets of the marked cells, whose edges between two nodes are divided into `parts` pieces. The sets contain
- * one piece at each of a cell's own nodes, so that the ranges of all fields include the values at these nodes. All
- * pieces of other cells are made. Local. The caller must drop *out even after an error. */
+/* Creates a set that contains, of each marked cell, one piece at each of the cell's own nodes, so that the ranges of
+ * all fields include the values at these nodes. Edges of marked cells between two nodes are divided into `parts`
+ * pieces. All pieces of the other cells are made. Local. The caller must drop *out even after an error. */
 insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
                                       session_piece_set *out, base_error *error);
 
@@ -22,7 +22,7 @@ insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session
  * must be known. Local. */
 insitu_status session_add_outer_pieces(const session_mesh *mesh, int parts, session_piece_set *set, base_error *error);
 
-/* Returns whether two sets for the same cells are equal. */
+/* Returns whether two sets select the same pieces of the same cell_count cells. */
 bool session_is_same_piece_set(const session_piece_set *a, const session_piece_set *b, int64_t cell_count);
 
 static inline int64_t session_piece_set_bytes(const session_piece_set *set, int64_t cell_count)

@@ -18,8 +18,9 @@ typedef struct session_rows {
     /* the caller's cells. If the caller gives no connectivity, the cells are read as if entry i of the connectivity
      * were vertex i. */
     grid cells;
-    /* Used if cells have no offsets. nodes_per_cell: number of nodes of each cell; row_stride: number of entries from
-     * the first node of a cell to the first node of the next cell. */
+    /* Used if the caller gives no offsets, so that all cells have the same number of nodes. nodes_per_cell: this
+     * number; row_stride: number of entries of the connectivity from the first node of a cell to the first node of the
+     * next cell. */
     int64_t nodes_per_cell, row_stride;
     /* set if the mesh is discontinuous (session_discontinuous), so that each node of each cell is a separate vertex */
     bool is_discontinuous;
@@ -27,10 +28,11 @@ typedef struct session_rows {
     session_row_kind kinds[ROWS_MOST_KINDS];
 } session_rows;
 
-/* Describes the rows of a mesh, whose description must be valid. The list of kinds is left empty
- * (session_list_kinds()). */
+/* Describes where the nodes of each cell of a mesh are in the connectivity. The mesh's description must be valid. The
+ * list of kinds is left empty (session_list_kinds()). */
 session_rows session_describe_rows(const session_mesh *mesh);
-/* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is left empty. */
+/* Does the same for a valid description of a mesh, whose cells share vertices as the caller has described them. The
+ * list of kinds is left empty. */
 session_rows session_describe_caller_rows(const insitu_mesh *given);
 
 /* Returns the index, in the caller's connectivity, of the entry with a cell's first node. */
@@ -53,14 +55,15 @@ static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry
     return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;
 }
 
-/* Returns the index of a cell's node, if the nodes of all cells are counted one after the other and unused entries of
- * the connectivity are not counted. */
+/* Returns the index of a cell's node in a sequence of all nodes of all cells. It is the index of an entry of the
+ * connectivity if unused entries are not counted. node: position of the node in the cell's list of nodes. */
 static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, int node)
 {
     return rows->cells.offsets.data ? session_row_first(rows, cell) + node : cell * rows->nodes_per_cell + node;
 }
 
-/* Returns the vertex of session_mesh.cells that is the node at the given position in the cell's row. */
+/* Returns the index, in session_mesh.cells, of the vertex that is the node at position `node` in the cell's list of
+ * nodes. */
 static inline int64_t session_find_row_vertex(const session_rows *rows, int64_t cell, int node)
 {
     return rows->is_discontinuous ? session_row_entry(rows, cell, node)

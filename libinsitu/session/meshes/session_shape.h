@@ -20,8 +20,8 @@ typedef struct session_shape {
 /* Returns the shape of a linear type. */
 const session_shape *session_get_cell_shape(int type);
 
-/* Computes a normal of a face's plane in the reference cell. For triangles and quads, whose reference cell is in the
- * plane z = 0, it is parallel to z. */
+/* Computes a normal of a face's plane in the reference cell; its length is not 1. The normal of the only face of a
+ * triangle or quad is parallel to z, because the reference cell lies in the plane z = 0. */
 void session_find_face_plane(const session_shape *shape, int face, int out[3]);
 
 /* Returns a bit mask of the faces on which a node of a lattice of this order lies; bit f stands for shape->faces[f].

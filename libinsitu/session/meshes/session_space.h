@@ -18,9 +18,9 @@ typedef struct session_extent {
 } session_extent;
 
 /* Returns the axis along which the data is flat (the last such axis, if there are several), or -1 if the data is not
- * flat. The data is flat along an axis if no cell has a volume and its extent along the axis is at most 1e-6 of the
- * largest extent. That fraction is about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the
- * result is the same on every rank. */
+ * flat. The data is flat along an axis if no cell has a volume and the bounds' extent along the axis is at most 1e-6 of
+ * their largest extent. This fraction of the extent is about 16 times the rounding error of a float32 coordinate, and
+ * 1/30 of a pixel in the widest picture. Local; the result is the same on every rank. */
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {

@@ -8,16 +8,17 @@
 /* Returns whether some cells are of higher order. If the mesh has mixed types, the types of all cells are read. */
 bool session_has_higher_order(const insitu_mesh *given);
 
-/* Creates mesh->topology with the pieces. Returns an error, and creates nothing, if types, counts, offsets or indices
- * of the caller's cells are invalid. Local. */
+/* Splits the cells into linear pieces, and stores the pieces in mesh->topology. Returns an error, and stores nothing,
+ * if types, numbers of nodes, offsets or vertex indices of the caller's cells are invalid. Local. */
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Creates a second connectivity of the pieces. Instead of vertices it contains the indices of entries of the caller's
- * connectivity, where unused entries at the end of each cell's entries are not counted. Local. */
+/* Creates a second connectivity of the pieces. For each corner of each piece it contains, instead of the index of a
+ * vertex, the index of the entry of the caller's connectivity from which the corner was taken; unused entries at the
+ * end of each cell's entries are not counted. Local. */
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
-/* Returns the index of an entry in the caller's connectivity. `entry` is its index if the unused entries at the end of
- * each cell's row are not counted. */
+/* Converts the index of an entry of the caller's connectivity. `entry` is the entry's index if the unused entries at
+ * the end of each cell's row are not counted; the result is its index if all entries are counted. */
 int64_t session_find_connectivity_index(const insitu_mesh *given, int64_t entry);
 
 /* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat. It is inverted

@@ -9,7 +9,8 @@ typedef struct mesh_tally {
     double lower[3], upper[3];
     /* number of cells in each class; shells are drawn cells of a type without volume: triangles, quads and polygons */
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
-    /* sum of the cube roots of the volumes; added block by block, which keeps the rounding error small */
+    /* sum of the cube roots of the cells' volumes. The sums of blocks of cells are computed first and then added up,
+     * which keeps the rounding error small. */
     double size_sum;
 } mesh_tally;
 
@@ -33,8 +34,9 @@ double tally_signed_volume(int type, double points[][3]);
  * ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
-/* Checks cells begin .. end - 1 and adds the valid ones to *tally. Stops at the first cell that is invalid, or that the
- * function cannot check, such as a polygon. Returns the index of this cell, or `end`. */
+/* A function that checks the cells begin .. end - 1 and adds them to *tally. It stops at the first cell that is
+ * invalid, or that it cannot check, such as a polygon, and returns the index of this cell; otherwise it returns
+ * `end`. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
 /* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,

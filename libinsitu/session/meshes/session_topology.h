@@ -21,7 +21,8 @@ typedef struct session_face_row {
 
 session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face);
 
-/* The caller's arrays that give, for each face, the cell that owns it and the neighbouring cell. */
+/* The caller's arrays that give the two cells of each face: the cell that owns the face (its owner), and the cell on
+ * the other side (its neighbour). */
 typedef struct session_face_sides {
     const insitu_mesh *given;
     grid_array owner, neighbour, boundary_owner;

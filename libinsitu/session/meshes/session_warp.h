@@ -8,13 +8,14 @@
 
 /* The displacements of the vertices of a mesh. */
 typedef struct session_displacement {
-    int field;                /* index of the field in the mesh */
-    uint64_t key;             /* hash of everything that determines the displacements */
-    int component_count;      /* number of components: 2 or 3 */
-    grid_array components[3]; /* for each axis, the array of displacements along it, one per tuple of the field */
-    grid_array index;         /* for each vertex, the index of its tuple; if it has no data, vertex i has tuple i */
-    int64_t count;            /* number of tuples of the field */
-    double scale;             /* factor by which displacements are multiplied */
+    int field;           /* index of the field in the mesh */
+    uint64_t key;        /* hash of all inputs from which the displacements are computed */
+    int component_count; /* number of components: 2 or 3 */
+    /* for each axis, the array of the displacements along this axis; one entry per tuple of the field */
+    grid_array components[3];
+    grid_array index; /* for each vertex, the index of its tuple; if it has no data, vertex i has tuple i */
+    int64_t count;    /* number of tuples of the field */
+    double scale;     /* factor by which displacements are multiplied */
 } session_displacement;
 
 /* Moves the vertices, unless they were moved by the same displacements before, and marks the mesh as moved if a
