@@ -42,14 +42,14 @@
 #include "vector3.h"
 
 enum {
-    SIZE = 4,            /* number of doubles of a tuple: x, y, z and a value */
+    SIZE = 4,            /* number of doubles of a tuple: x, y, z and the field's value */
     COARSE = 4,          /* minimum order of the first, coarsest lattice */
     FINE = 16,           /* maximum order of all further lattices */
     MOST_DIRECTIONS = 7, /* number of directions of the edges of pieces in one simplex */
-    TET_SHAPES = 5       /* number of different shapes of the pieces of a tet */
+    TET_SHAPES = 5       /* number of different shapes of the small tets into which a tet is cut */
 };
 
-/* Number of directions of the edges of pieces in a simplex, by its dimensions. */
+/* For each number of dimensions of a simplex, the number of directions that edges of its pieces have. */
 static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
 /* ---- polynomials on one simplex ---------------------------------------------------------------------------------- */
@@ -75,7 +75,8 @@ typedef struct node_lists {
     int (*nodes)[4], (*fine)[4], (*lower)[4];
 } node_lists;
 
-/* Returns the index of a node in the list of list_nodes(). node: barycentric coordinates times the order. */
+/* Returns the index of a node in the list that list_nodes() makes. node: barycentric coordinates of the node times the
+ * order. */
 static int find_node(int dimensions, int order, const int node[4])
 {
     int at = node[1];
@@ -127,8 +128,9 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
     }
 }
 
-/* Adds a second difference of Bernstein coefficients along a direction. lower: index in lists->lower of the node at
- * which the difference is taken. number: index of the direction in list_differences(). */
+/* Adds a second difference of Bernstein coefficients to out->differences. direction: direction of the difference, in
+ * barycentric coordinates; number: its index in list_differences(). lower: index in lists->lower of the node at which
+ * the difference is taken. */
 static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
                            session_bound_factor *out)
 {
@@ -162,8 +164,8 @@ static double *make_matrix(int rows, int columns)
     return base_calloc((size_t)rows * (size_t)columns, sizeof(double));
 }
 
-/* Converts a matrix that is applied to Bernstein coefficients into one that is applied to values at the cell's nodes.
- * spare: working memory of the matrix's size. */
+/* Multiplies a matrix whose columns belong to Bernstein coefficients by of->bernstein, so that its columns belong to
+ * values at the cell's nodes. spare: working memory of the matrix's size. */
 static void convert_columns(const session_bound_factor *of, int level, double *matrix, double *spare)
 {
     const int rows = of->fine_counts[level], columns = of->node_count;
@@ -253,20 +255,22 @@ static void drop_factor(session_bound_factor *factor)
     *factor = (session_bound_factor){0};
 }
 
-/* ---- products of factors ----------------------------------------------------------------------------------------- */
+/* ---- reference cells as products of simplices -------------------------------------------------------------------- */
 
 static int count_factors(int type)
 {
     return type == GRID_HEX ? 3 : type == GRID_QUAD || type == GRID_WEDGE ? 2 : 1;
 }
 
-/* Returns a factor of the reference cell by its index. A triangle or tet is factor 0; all other factors are lines. */
+/* Returns a factor of the reference cell: the simplex with this index in the Cartesian product of simplices that the
+ * reference cell is. A triangle or tet has the index 0; all other factors are lines. */
 static const session_bound_factor *factor_of(const session_bound *of, int factor)
 {
     return factor == 0 && of->simplex.dimensions ? &of->simplex : &of->line;
 }
 
-/* Makes the finer lattices. Their orders are multiples of the cell's order. */
+/* Lists the finer lattices and the linear pieces between their nodes. The orders of these lattices are multiples of the
+ * cell's order. */
 static bool make_levels(session_bound *out)
 {
     const int type = out->lattice.type, p = out->lattice.order;
@@ -308,7 +312,7 @@ void session_drop_bound(session_bound *bound)
     drop_factor(&bound->simplex);
 }
 
-/* ---- one cell -------------------------------------------------------------------------------------------------- */
+/* ---- error bounds of one cell ------------------------------------------------------------------------------------ */
 
 /* The input and intermediate results of computing the bounds of one cell. */
 typedef struct bound_job {
@@ -318,14 +322,14 @@ typedef struct bound_job {
     /* nodes: tuples (x, y, z and value) at all nodes of a complete cell of the cell's order; coefficients: Bernstein
      * coefficients of these tuples */
     double *nodes, *coefficients;
-    /* fine: tuples at the nodes of the finer lattice that is used; slopes: their derivatives along the axes of the
-     * reference cell */
+    /* fine: tuples at the nodes of the finer lattice that is used; slopes: derivatives of these tuples along each axis
+     * of the reference cell */
     double *fine, *slopes[3];
     /* gradient of the field at each node of the finer lattice; not finite at nodes where the cell is flat */
     double (*gradients)[3];
     double *work; /* working memory of multiply_by_matrices() */
-    /* bounds of u (top of the file) if the whole cell is one piece (m = 1): bound of the length of u for positions, and
-     * bound of |u| for the field */
+    /* bounds of the difference between the polynomials and their linear interpolation if the whole cell is one piece:
+     * of the difference's length for positions, and of its absolute value for the field */
     double position_bound, value_bound;
 } bound_job;
 
@@ -348,9 +352,9 @@ static void divide_work(bound_job *job, double *work)
     job->work = work + 3 * job->of->levels[job->level].count;
 }
 
-/* Multiplies an array of tuples, of `size` doubles each, by matrices[f] along each factor f of the reference cell. If
- * is_fine is set, the matrices give tuples at the nodes of the finer lattice; otherwise they give as many tuples as the
- * cell has nodes. */
+/* Applies matrices[f] along each factor f to an array of tuples of `size` doubles. The factors are the simplices whose
+ * Cartesian product the reference cell is. in: one tuple for each node of the cell. out: one tuple for each node of the
+ * finer lattice if is_fine is set; otherwise as many tuples as the cell has nodes. */
 static void multiply_by_matrices(const bound_job *job, int size, const double *const matrices[3], bool is_fine,
                                  const double *in, double *out)
 {
@@ -368,16 +372,17 @@ static void multiply_by_matrices(const bound_job *job, int size, const double *c
     }
 }
 
-/* Returns the largest value of q inside a triangle whose B_ij are a, b and c; 0 if the maximum is not inside. q and
- * B_ij are defined at the top of the file; here m = 1. */
+/* Returns the maximum over a triangle of q, half the sum of B_ij l_i l_j over the pairs of corners, where l_i are
+ * barycentric coordinates and a, b and c are the three B_ij. Returns 0 if the maximum is not inside the triangle. */
 static double largest_q_in_triangle(double a, double b, double c)
 {
     const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
     return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
 }
 
-/* Returns the largest value of q inside a tet; 0 if the maximum is not inside. q and B_ij are defined at the top of the
- * file; here m = 1. b: B_ij for the pairs of corners 01, 02, 03, 12, 13 and 23. */
+/* Returns the maximum over a tet of q, half the sum of B_ij l_i l_j over the pairs of corners, where l_i are
+ * barycentric coordinates. Returns 0 if the maximum is not inside the tet. b: B_ij for the pairs of corners 01, 02, 03,
+ * 12, 13 and 23. */
 static double largest_q_in_tet(const double b[6])
 {
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
@@ -392,7 +397,8 @@ static double largest_q_in_tet(const double b[6])
     return is_inside && sum > 0 ? 0.25 / sum : 0;
 }
 
-/* Returns the largest value of q in a tet, including its faces and edges. b: as in largest_q_in_tet(). */
+/* Returns the maximum over a tet, including its faces and edges, of q, half the sum of B_ij l_i l_j over the pairs of
+ * corners, where l_i are barycentric coordinates. b: B_ij in the order of largest_q_in_tet(). */
 static double largest_q_in_shape(const double b[6])
 {
     static const int faces[4][3] = {{0, 1, 3}, {0, 2, 4}, {1, 2, 5}, {3, 4, 5}};
@@ -406,8 +412,9 @@ static double largest_q_in_shape(const double b[6])
     return least > 0 ? fmax(out, largest_q_in_tet(b)) : out;
 }
 
-/* Returns the bound of u in the pieces of one factor of the reference cell, for m = 1 (top of the file). b: B_ij for
- * each direction of edges, in the order of list_differences(). */
+/* Returns a bound of u, a polynomial on a simplex minus its linear interpolation, for all shapes that pieces of the
+ * simplex have. The edges of pieces are as long as those of the simplex (m = 1 at the top of the file). b: for each
+ * direction of edges, in the order of list_differences(), an upper bound of minus the second derivative of u. */
 static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
 {
     static const signed char tets[TET_SHAPES][6] = {
@@ -424,14 +431,15 @@ static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
     return out;
 }
 
-/* Upper bounds of u (`above`) and of -u (`below`) for each element of a tuple (x, y, z, value). u is the difference
- * defined at the top of the file, for m = 1. */
+/* Upper bounds of u (`above`) and of -u (`below`) for each element of a tuple (x, y, z, value). u is the polynomial
+ * minus its linear interpolation if the whole cell is one piece. */
 typedef struct bound_sums {
     double above[SIZE], below[SIZE];
 } bound_sums;
 
-/* Adds the bounds of u and of -u (top of the file) for one factor of the reference cell to *sums. inner: number of
- * doubles from one coefficient of the factor to the next. */
+/* Adds the bounds of u and of -u for one factor of the reference cell to *sums, where u is the polynomial minus its
+ * linear interpolation along this factor only. inner: number of doubles from one coefficient of the factor to the
+ * next. */
 static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->lattice.count;
@@ -471,7 +479,8 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
     multiply_by_matrices(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
-/* Computes job->position_bound and job->value_bound from the Bernstein coefficients. */
+/* Computes job->position_bound and job->value_bound, the bounds of the difference between the polynomials and their
+ * linear interpolation, from the Bernstein coefficients. */
 static void bound_differences(bound_job *job)
 {
     bound_sums sums = {{0}, {0}};
@@ -528,7 +537,8 @@ static void find_gradient(const bound_job *job, int node, double out[3])
     for (int x = 0; x < 3; x++) out[x] = (a[3] * bc[x] + b[3] * ca[x] + last * ab[x]) / volume;
 }
 
-/* Computes the tuples, their derivatives and the field's gradient at all nodes of the finer lattice that is used. */
+/* Computes the positions and values, their derivatives along the axes of the reference cell, and the field's gradient
+ * in space, at all nodes of the finer lattice that is used. */
 static void find_gradients(bound_job *job)
 {
     const session_bound *of = job->of;
@@ -569,7 +579,8 @@ static double least_gradient(const bound_job *job, const int *corners, int count
     return isfinite(length) && least > 0 ? least : 0;
 }
 
-/* Computes out->is_crossed and out->surface_error as described at the top of the file. */
+/* Computes whether an isosurface may cross the cell (out->is_crossed), and the bound of the isosurfaces' error
+ * (out->surface_error), as described at the top of the file. */
 static void bound_isosurface(bound_job *job, session_cell_bound *out)
 {
     const session_bound_level *level = &job->of->levels[job->level];
@@ -607,7 +618,8 @@ static double find_node_distance(const session_bound *of, const double *tuples)
     return sqrt(sum / shape->edge_count) / of->nodes.of.order;
 }
 
-/* Estimates the cell's volume from the mean edge along each axis of the reference cell. */
+/* Estimates the cell's volume as that of a straight cell. Its edge vector along each axis of the reference cell is the
+ * mean of the cell's edges along this axis. */
 static double find_volume(const session_bound *of, const double *tuples)
 {
     const session_shape *shape = session_get_cell_shape(of->nodes.of.type);
@@ -647,20 +659,20 @@ static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, 
         for (int x = 0; x < 3; x++) out[x] += job->gradients[n][x] / count;
 }
 
-/* Mean of u and mean of the square of u over the pieces of a cell. u is the difference between the polynomial and the
- * linear interpolation (top of the file), for m = 1. */
+/* Mean of u and mean of the square of u over a cell that is one piece. u is the polynomial minus its linear
+ * interpolation. */
 typedef struct difference_means {
     double mean, square;
 } difference_means;
 
-/* Returns the means of u and its square over a piece of a simplex. second: the second derivative s_ij of u along each
- * edge of the piece, from corner i to corner j, in the order of list_differences(). Let l_i be the barycentric
- * coordinates in the piece. Then u is half the sum of -s_ij l_i l_j over all edges, and the means of products of the
- * l_i are known. */
+/* Returns the means of u and its square over a simplex, where u is a polynomial of order 2 minus its linear
+ * interpolation. second: the second derivative s_ij of u along each edge, from corner i to corner j, in the order of
+ * list_differences(). Let l_i be the barycentric coordinates. Then u is half the sum of -s_ij l_i l_j over all edges,
+ * and the means of products of the l_i are known. */
 static difference_means find_means(int dimensions, const double *second)
 {
     static const int edge_counts[] = {0, 1, 3, 6};
-    /* mean of l_i l_j over a simplex, by its number of dimensions */
+    /* mean over a simplex of the product l_i l_j of two barycentric coordinates, by the number of dimensions */
     static const double singles[] = {0, 1.0 / 6, 1.0 / 12, 1.0 / 20};
     /* means of products of barycentric coordinates over a simplex, by its number of dimensions: l_i^2 l_j^2, l_i^2 l_j
      * l_k and l_i l_j l_k l_l, where different indices stand for different corners */
@@ -704,11 +716,12 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
     return (difference_means){out.mean / fmax(1, count), out.square / fmax(1, count)};
 }
 
-/* Returns the root mean square of the error of the field in a cell, if the whole cell is one piece (m = 1). At a point
- * of space, the error is, to first order, u of the values minus the gradient times u of the positions (u is defined at
- * the top of the file). The second derivatives of u are approximated by second differences of the coefficients. It is
- * assumed that tets from octahedra have the same shape as the other tets, and that the differences of the factors are
- * independent. coefficients: working memory with one number per node. */
+/* Returns an estimate of the root mean square of the error of the field in a cell, if the whole cell is one piece. Let
+ * u be a polynomial minus its linear interpolation. At a point of space, the error is, to first order, u of the field
+ * minus the product of the gradient and u of the positions. The second derivatives of u are approximated by second
+ * differences of the Bernstein coefficients. It is assumed that the tets into which octahedra are cut have the same
+ * shape as the other tets, and that the values of u of the different factors of the reference cell are independent.
+ * coefficients: working memory with one number per node. */
 static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
 {
     double mean = 0, variance = 0;

@@ -27,8 +27,8 @@
 
 enum { MOST_NODES_OF_LINE = NODES_MOST_ORDER + 1 };
 
-/* The terms of derivatives, which are found in two passes. The first pass only counts the terms, and out->nodes is
- * NULL; the second pass stores them. */
+/* State of finding the terms of derivatives: products of a weight and the value at a node. There are two passes: in the
+ * first one out->nodes is NULL, and the terms are only counted; in the second one they are stored. */
 typedef struct term_list {
     session_derivatives *out;
     const session_nodes *of;
@@ -41,9 +41,10 @@ typedef struct term_list {
     double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE], slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
 } term_list;
 
-/* ---- one dimension --------------------------------------------------------------------------------------------- */
+/* ---- derivatives of polynomials of one variable ------------------------------------------------------------------ */
 
-/* Computes the derivative of Legendre's polynomial of degree p at x, and its second derivative. */
+/* Computes the first derivative (result) and the second derivative (*curvature) of the Legendre polynomial of degree p
+ * at x. */
 static double compute_legendre_slope(int p, double x, double *curvature)
 {
     double last = 1, value = x;
@@ -91,7 +92,8 @@ static void compute_line_derivatives(term_list *list, bool is_lobatto)
         }
 }
 
-/* Computes B_n and its derivative at t = i / parts for all indices i of nodes on a line. */
+/* Computes list->values and list->slopes, the values and derivatives of the polynomials B_n (top of this file) at t = i
+ * / parts, for all indices i of nodes on an edge. */
 static void compute_simplex_derivatives(term_list *list)
 {
     for (int n = 0; n <= list->order_of_polynomial; n++)
@@ -163,8 +165,8 @@ static void add_term(term_list *list, int i, int j, int k, double weight)
         add_missing_term(list, (const int[]){i, j, k}, weight);
 }
 
-/* Adds the terms of the derivative at a node along an axis of the lattice. `at` are the lattice indices of the node.
- * The sum has a term for each node of the polynomial on the line through this node along the axis. */
+/* Adds the terms of the derivative along an axis of the lattice at the node with the lattice indices `at`. There is one
+ * term for each node that determines the polynomial on the line through this node along the axis. */
 static void add_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};

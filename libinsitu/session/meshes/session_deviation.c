@@ -40,17 +40,18 @@ void session_read_request_values(const session_rows *rows, const session_deviati
         read_distances(rows, request->plane, cell, count, out);
 }
 
-/* The input of measuring the cells of a mesh. */
+/* The input from which the error bounds of a mesh's cells are computed. */
 typedef struct deviation_work {
     session_rows rows; /* access to each cell's list of nodes */
     const session_deviation_request *request;
-    int field_size; /* number of components of the field, or 1 */
-    /* matrices for each kind of cell (type and number of nodes); empty for kinds that are not measured */
+    int field_size; /* number of components of the request's field; 1 if the request has no field */
+    /* for each kind of cell (type and number of nodes), the matrices from which error bounds are computed; empty for
+     * kinds that are not measured */
     session_bound bounds[ROWS_MOST_KINDS];
 } deviation_work;
 
-/* Returns whether session_make_bound() supports cells with these nodes. The result is true for linear cells, too: they
- * are not measured, but they are marked, since their neighbours may be of higher order. */
+/* Returns whether session_make_bound() supports cells with these nodes. The result is also true for linear cells, which
+ * have no error. They must be marked if a surface may cross them, since their neighbours may be of higher order. */
 static bool has_bound(const session_nodes *of)
 {
     return of->order <= (of->type == GRID_PYRAMID ? (int)INTERPOLATION_MOST_PYRAMID : (int)BOUND_MOST_ORDER);
@@ -130,8 +131,9 @@ static double find_largest_reported_error(const session_cell_bound *bound)
     return 0.5 * bound->node_distance + bound->position_error;
 }
 
-/* Returns a bound of the isosurfaces' error in a cell. Successively finer lattices are used while the bound exceeds
- * `enough` or find_largest_reported_error(). `first` contains the bounds from the coarsest lattice. */
+/* Returns a bound of the isosurfaces' error in a cell. first: the bounds that the coarsest lattice gives. As long as
+ * the bound exceeds `enough` or find_largest_reported_error(), it is also computed on the next finer lattice, and the
+ * smallest of these bounds is returned. */
 static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
                                  const session_cell_bound *first, double *buffer)
 {
@@ -175,9 +177,10 @@ static int64_t estimate_area(const session_cell_bound *bound, const session_node
     return (int64_t)fmin(16 * share * edge * edge, 1e12);
 }
 
-/* Measures a cell, and updates *out. A cell whose error, computed on the coarsest lattice, is below the largest error
- * so far does not affect the result, so that its bound is not computed on finer lattices. The result therefore does not
- * depend on the order of cells. */
+/* Computes the error bound or the values of a cell, as requested, and updates *out. The bound of isosurfaces is first
+ * computed on the coarsest lattice, and finer lattices can only lower it. They are tried only while the bound exceeds
+ * the largest bound of the cells before or find_largest_reported_error(); a smaller bound cannot change the result. The
+ * result therefore does not depend on the order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_find_kind_of_cell(&w->rows, cell)];

@@ -12,18 +12,21 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* Indices in session_finer.counts, whose sums over all ranks are computed. Entry p below LOBATTO is the number of parts
- * of the mesh whose cells have the highest order p. The entries named here are numbers of cells. */
+/* Indices in session_finer.counts, whose elements are summed over all ranks. Element p below LOBATTO: number of parts
+ * of the mesh in which p is the highest order of a cell. The elements named here are numbers of cells: hexes and quads
+ * of order 3 and more with Gauss-Lobatto nodes, and with equispaced nodes; pyramids of an order above
+ * INTERPOLATION_MOST_PYRAMID; serendipity cells; shells. */
 enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS, SERENDIPITY, SHELLS };
 _Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place");
 
-/* ---- all cells of a mesh ----------------------------------------------------------------------------------------- */
+/* ---- interpolation in all cells of a mesh ------------------------------------------------------------------------ */
 
 typedef struct finer_work {
     session_rows rows; /* access to the nodes of each of the caller's cells */
     const session_finer *finer;
-    const unsigned char *marks; /* while lattices are made: one byte per cell, nonzero if the cell is refined; NULL: all
-                                   cells are refined */
+    /* used while finer lattices are made: one byte per cell, nonzero if the cell is refined; NULL: all cells are
+     * refined */
+    const unsigned char *marks;
     /* for each kind of cell (type and number of nodes): the interpolation for refined cells (index 0), and that for all
      * other cells, which have one part between two nodes (index 1) */
     session_interpolation kinds[ROWS_MOST_KINDS][2];
@@ -48,8 +51,8 @@ static bool begin_work(const session_finer *finer, const unsigned char *marks, f
     return is_made;
 }
 
-/* Returns whether a cell is refined, after finer lattices have been made. count: number of nodes that a refined cell of
- * this type and order has. */
+/* Returns whether a cell has been refined, by its number of nodes in the finer lattices. count: number of nodes of a
+ * refined cell of the same type and order. */
 static bool is_refined(const session_finer *finer, int count, int64_t cell)
 {
     return !finer->offsets || finer->offsets[cell + 1] - finer->offsets[cell] == count;
@@ -128,7 +131,7 @@ insitu_status session_interpolate_values(const session_mesh *mesh, const session
     return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the interpolation in cells", mesh->label);
 }
 
-/* ---- the finer mesh ---------------------------------------------------------------------------------------------- */
+/* ---- making the finer lattices of a mesh ------------------------------------------------------------------------- */
 
 static void read_vertex(const void *of, int64_t position, double *tuple)
 {
@@ -198,8 +201,8 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
     return is_made;
 }
 
-/* Frees all data that was computed from the cells and nodes that the session has read until now. Called after
- * mesh->given has been replaced by a description of other nodes. */
+/* Frees all data that was computed from the previous cells and nodes of a mesh. It must be called after mesh->given has
+ * been replaced by a description with other nodes. */
 static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
 {
     session_drop_cell_data(meshes, mesh);
@@ -223,8 +226,8 @@ void session_end_finer_lattices(session_meshes *meshes)
     }
 }
 
-/* Returns whether the existing finer lattices and pieces were made for the same refined cells and the same pieces as
- * those in `marks`. */
+/* Returns whether the existing finer lattices have exactly the refined cells and the linear pieces that `marks`
+ * selects. marks: NULL selects all cells and pieces. */
 static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
@@ -389,7 +392,7 @@ insitu_status session_count_higher_order_cells(session_meshes *meshes, const ses
     return status;
 }
 
-/* ---- marks of refined cells -------------------------------------------------------------------------------------- */
+/* ---- marks of refined cells, and memory of finer lattices -------------------------------------------------------- */
 
 bool session_allocate_cell_marks(session_finer_choice *choice, const session_parts *parts)
 {
@@ -415,8 +418,9 @@ void session_free_choices(session_finer_choice *choices, int count)
     base_free(choices);
 }
 
-/* Adds to *out the number of bytes that the finer lattices of `cells` cells take if each edge between two nodes is cut
- * into `parts` parts: the nodes, 4 bytes for each vertex of a piece, and 4 for each piece to store its cell. */
+/* Adds to *out the number of bytes of the finer lattices of `cells` cells in which each edge between two nodes is cut
+ * into `parts` parts. out->own: 24 bytes for the coordinates of each node, 4 for each vertex of a piece, and 4 for each
+ * piece to store the index of its cell; out->per_component: 8 bytes for the value at each node. */
 static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
     const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;

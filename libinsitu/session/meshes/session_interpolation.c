@@ -1,5 +1,5 @@
-/* All weights of interpolation are products of the weights of a line, a triangle and a tet, which are applied one after
- * the other:
+/* The weights of interpolation in each type of cell are products of the weights of a line, a triangle, a tet or a
+ * pyramid, which are applied one after the other:
  *
  *     hex        line along i, then j, then k
  *     quad       line along i, then j
@@ -37,7 +37,8 @@ static int find_lexicographic_index(const session_nodes *of, const int at[3])
 
 /* ---- weights of interpolation ---------------------------------------------------------------------------------- */
 
-/* Computes the weights of a line: the values of its Lagrange polynomials at the nodes of the finer lattice. */
+/* Computes the weights of a line: the values of the Lagrange polynomials of its p + 1 nodes at the parts * p + 1 nodes
+ * of the finer lattice. out: one row per finer node, one column per polynomial. */
 static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
 {
     double x[NODES_MOST_ORDER + 1];
@@ -51,7 +52,8 @@ static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
         }
 }
 
-/* Computes B_n(t), as defined in session_derivatives.c. */
+/* Computes B_n(t) = t (t - 1) ... (t - n + 1) / n!. The Lagrange polynomials of triangles and tets with equispaced
+ * nodes are products of these polynomials (session_derivatives.c). */
 static double evaluate_silvester_polynomial(int n, double t)
 {
     double value = 1;
@@ -59,8 +61,9 @@ static double evaluate_silvester_polynomial(int n, double t)
     return value;
 }
 
-/* Computes the weights of a triangle or, if is_tet is set, of a tet. p: order of the cell; parts: the fine lattice has
- * the order parts * p. */
+/* Computes the weights of a triangle or, if is_tet is set, of a tet: the values of the Lagrange polynomials of order p
+ * at the nodes of the finer lattice, which has the order parts * p. out: one row per finer node, one column per
+ * polynomial. */
 static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
 {
     const int fine = parts * p;
@@ -76,7 +79,7 @@ static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
                                      evaluate_silvester_polynomial(p - a - b - c, (double)(fine - i - j - k) / parts);
 }
 
-/* ---- pyramids ---- */
+/* ---- weights of pyramids ---- */
 
 /* Returns the Legendre polynomial of order n, for t from 0 to 1. */
 static double find_legendre(int n, double t)
@@ -90,7 +93,8 @@ static double find_legendre(int n, double t)
     return value;
 }
 
-/* Computes a pyramid's basis at a point with coordinates from 0 to 1. Its functions are
+/* Computes the values of a pyramid's basis functions at a point with coordinates from 0 to 1. P_n are the Legendre
+ * polynomials of the interval from 0 to 1. The functions are
  *
  *     P_i(x / (1 - z)) P_j(y / (1 - z)) (1 - z)^max(i, j) P_k(z),
  *
@@ -134,9 +138,9 @@ static void fill_pyramid_rows(int p, int n, double *out)
                 fill_pyramid_basis(p, (const double[]){(double)i / n, (double)j / n, (double)k / n}, out);
 }
 
-/* Converts rows with the values of a pyramid's basis functions at points. Each row is replaced by the weights with
- * which the values at the pyramid's nodes are summed to give the value at the row's point. Returns false if memory runs
- * out. */
+/* Converts values of a pyramid's basis functions into weights of the pyramid's nodes. Before the call, each row has the
+ * values of the basis functions at a point. Afterwards it has the weights with which the values at the pyramid's nodes
+ * are summed to give the value at this point. Returns false if memory runs out. */
 static bool convert_rows(int p, int count, double *rows)
 {
     const int size = session_complete_nodes(GRID_PYRAMID, p).count;
@@ -157,7 +161,8 @@ static bool convert_rows(int p, int count, double *rows)
     return is_made;
 }
 
-/* Computes the weights of a pyramid. Returns false if memory runs out. */
+/* Computes the weights with which the values at a pyramid's nodes are summed at each node of the finer lattice. out:
+ * one row per finer node, one column per node of the pyramid. Returns false if memory runs out. */
 static bool fill_pyramid_weights(int p, int parts, double *out)
 {
     fill_pyramid_rows(p, parts * p, out);
@@ -175,7 +180,7 @@ double *session_compute_collapse_matrix(int p)
     return NULL;
 }
 
-/* ---- all types ---- */
+/* ---- weights of all types of cells ---- */
 
 static size_t count_weights(int type, int p, int parts)
 {
@@ -197,7 +202,8 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
     return of->type != GRID_PYRAMID || fill_pyramid_weights(p, parts, out->whole);
 }
 
-/* Finds out->positions and out->corners, the positions of nodes and corners in the cell's list of nodes. */
+/* Finds out->positions and out->corners, the positions of all nodes and of the corners in the cell's list of nodes in
+ * the connectivity. */
 static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     const int p = of->order;
@@ -210,16 +216,17 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
     session_find_corners(of, order, out->corners);
 }
 
-/* ---- faces and edges ---- */
+/* ---- nodes on faces and edges ---- */
 
-/* The axes of a face or edge: positions of its origin and of the ends of both axes, in a lattice of order 1. The second
- * axis of an edge has the length 0. */
+/* Two axes along which the nodes of a face are listed; for an edge, the second axis has the length 0. origin: lattice
+ * indices, in a lattice of order 1, of the corner from which both axes start; along, across: those of the corners at
+ * which the first and the second axis end. */
 typedef struct side_axes {
     const signed char *origin, *along, *across;
 } side_axes;
 
-/* Finds the axes of a face or edge for one of the orders in which its nodes can be listed. turn: number of this order,
- * 0 .. session_interpolation_sides.turn_count - 1. */
+/* Finds the axes along which the nodes of a face or edge are listed in one of the possible orders. side: the face's
+ * corners, in order around it; turn: number of the order, 0 .. session_interpolation_sides.turn_count - 1. */
 static side_axes find_side_axes(const session_shape *shape, const signed char *side, int corner_count, int turn)
 {
     const int first = corner_count == 2 ? turn : turn / 2, step = corner_count > 2 && turn % 2 ? corner_count - 1 : 1;
@@ -229,7 +236,8 @@ static side_axes find_side_axes(const session_shape *shape, const signed char *s
     return (side_axes){at[(int)side[first]], at[(int)side[along]], at[(int)side[across]]};
 }
 
-/* Lists the indices, in the lattice of the cell, of the nodes of a face or an edge. */
+/* Lists the nodes of a face or an edge, row by row along its axes. out: receives the lexicographic index of each node
+ * in the lattice `of`. */
 static void list_side(const session_nodes *of, const side_axes *axes, int corner_count, int *out)
 {
     const int p = of->order;
@@ -285,7 +293,8 @@ static bool list_all_sides(session_interpolation *out)
     return list_sides(out, quads) && list_sides(out, triangles) && list_sides(out, edges);
 }
 
-/* Returns whether node `parts * i` of the finer lattice, counted along an axis, coincides with node i of the cell. */
+/* Returns whether, along an axis, node `parts * i` of the finer lattice coincides with node i of the cell; it may not
+ * if the cell's nodes are Gauss-Lobatto points. */
 static bool is_own_position(const session_interpolation *of, int parts, int i)
 {
     const double *row = of->line + parts * i * (of->of.order + 1);
@@ -342,20 +351,20 @@ void session_drop_interpolation(session_interpolation *interpolation)
     *interpolation = (session_interpolation){0};
 }
 
-/* ---- one cell -------------------------------------------------------------------------------------------------- */
+/* ---- interpolation in one cell ----------------------------------------------------------------------------------- */
 
 /* The state of interpolating the values of one cell. */
 typedef struct cell_job {
     const session_interpolation *of;
     int size;        /* number of components */
     double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
-    /* working memory for intermediate results; each has the size of spare_count() tuples */
+    /* two arrays for intermediate results, with space for spare_count() tuples each */
     double *spare[2];
     double *out;
 } cell_job;
 
-/* Returns the number of nodes for which memory is needed at a time: all nodes of the finer lattice, or the nodes of all
- * faces or edges, whichever is larger. */
+/* Returns the largest number of tuples that an intermediate result has: the number of nodes of the finer lattice or, if
+ * it is larger, the sum of the numbers of finer nodes on all quads, on all triangles or on all edges. */
 static int spare_count(const session_interpolation *of)
 {
     int most = of->fine.count;
@@ -371,8 +380,9 @@ size_t session_interpolation_work_size(const session_interpolation *of, int comp
     return ((size_t)of->complete.count + 2 * (size_t)spare_count(of)) * (size_t)components;
 }
 
-/* Computes one row of the product of a matrix with an array. Each sum has the same terms in the same order, whether it
- * is computed in a chunk, whose loops the compiler vectorizes, or in the elements that remain after the last chunk. */
+/* Computes one row of the product of a matrix and an array: out[s] is the sum of row[c] * in[c * inner + s] over c, for
+ * weights row[c] whose sum is 1. The elements are processed in chunks, whose loops the compiler vectorizes, and the
+ * remaining ones one by one; the terms of each sum have the same order in both cases. */
 static void apply_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
 {
     enum { CHUNK = 4 };
@@ -412,7 +422,9 @@ static double sum_pair(const cell_job *job, const int at[3], const int step[3], 
     return neighbour_value(job, at, step, component) + neighbour_value(job, at, back, component);
 }
 
-/* Returns the value at the middle of a face of a serendipity cell. The sums do not depend on the order of axes. */
+/* Returns the value of one component at the middle of a face of a serendipity cell. at: lattice indices of the middle.
+ * a, b: steps in lattice indices from the middle to two midpoints of edges. The bits of the result do not change if a
+ * and b are swapped. */
 static double middle_of_face(const cell_job *job, const int at[3], const int a[3], const int b[3], int component)
 {
     const int sum[3] = {a[0] + b[0], a[1] + b[1], a[2] + b[2]}, difference[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -495,9 +507,9 @@ static void rank_corners(int count, const double (*corners)[3], int ranks[8])
         }
 }
 
-/* Chooses one of the orders in which the nodes of a face or an edge can be listed, by the places of its corners in the
- * lexicographic order of positions (rank_corners()). All cells that share the face or edge choose the same order of its
- * nodes. */
+/* Chooses one of the orders in which the nodes of a face or an edge can be listed, and returns its number. ranks: for
+ * each corner of the cell, the number of corners before it in the lexicographic order of positions. All cells that
+ * share the face or edge choose the same order of its nodes. */
 static int choose_corner_numbering(const signed char *side, int corner_count, const int ranks[8])
 {
     int first = 0;

@@ -103,9 +103,10 @@ const char *session_describe_unsupported_node_order(const session_nodes *of, ins
     return NULL;
 }
 
-/* ---- VTK's order ----------------------------------------------------------------------------------------------- */
+/* ---- VTK's order of nodes ---------------------------------------------------------------------------------------- */
 
-/* Returns the index of a quad's corner in VTK's order. i and j are nonzero at the far end of their axis. */
+/* Returns the index of a quad's corner in VTK's order. i, j: true if the corner is at the far end of the first or
+ * second axis. */
 static int number_quad_corner(bool i, bool j)
 {
     return i ? (j ? 2 : 1) : (j ? 3 : 0);
@@ -227,7 +228,7 @@ static int number_vtk_node(const session_nodes *of, bool is_old, int i, int j, i
     }
 }
 
-/* ---- the other orders ------------------------------------------------------------------------------------------ */
+/* ---- lexicographic order, and orders of Gmsh and Exodus ---------------------------------------------------------- */
 
 static int number_triangle_row_node(int p, int i, int j)
 {
@@ -258,8 +259,8 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     }
 }
 
-/* Returns the permutation of the nodes other than corners between VTK's order and the given one, for cells of order 2:
- * for each node in VTK's order, its position in the given order. NULL: both orders are the same. */
+/* For cells of order 2: returns a table with one entry for each node other than a corner, in VTK's order: the node's
+ * position in the given order. Returns NULL if both orders are the same. */
 static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};

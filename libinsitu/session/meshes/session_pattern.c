@@ -23,16 +23,16 @@
 #include "session_cell_order.h"
 #include "session_shape.h"
 
-/* ---- listed pieces --------------------------------------------------------------------------------------------- */
+/* ---- pieces of cells with all nodes of their order --------------------------------------------------------------- */
 
-/* A list of pieces under construction. If `piece_positions` and `types` are NULL, pieces are only counted; otherwise
- * they are stored. */
+/* The pattern to which pieces are added. In a first pass out->piece_positions and out->types are NULL, and pieces are
+ * only counted; in a second pass they are stored. */
 typedef struct pattern_list {
     session_pattern *out;
     insitu_vertex_order order;
 } pattern_list;
 
-/* Adds a piece. nodes: lattice indices of its vertices. */
+/* Adds a piece to the pattern. nodes: lattice indices i, j, k of each of its vertices. */
 static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 {
     session_pattern *out = list->out;
@@ -45,8 +45,8 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
     out->piece_size += count;
 }
 
-/* Adds a piece. Each of its vertices is the node with the lattice indices `at`, plus 0 or 1 along each axis: bit n of
- * the vertex's entry in `steps` is the offset along axis n. */
+/* Adds a piece whose vertices are corners of a cube of the lattice. at: lattice indices of the cube's first corner.
+ * steps: for each vertex, three bits; bit n is the offset, 0 or 1, that is added to the lattice index along axis n. */
 static void add_piece_by_corner_offsets(const pattern_list *list, int type, const int at[3], const signed char *steps)
 {
     int nodes[GRID_MAX_CELL_VERTICES][3];
@@ -229,7 +229,7 @@ static bool has_node(const pattern_polygon *p, int node)
     return has;
 }
 
-/* Does the same as session_cut_serendipity() for a quad. */
+/* Splits a serendipity quad into triangles. Parameters and result are those of session_cut_serendipity(). */
 static int split_quad(const session_pattern *of, const int *ranks, int pieces[][4])
 {
     int count = 0, triangles[2][3];
@@ -261,7 +261,7 @@ int session_cut_serendipity(const session_pattern *pattern, const int *ranks, in
     return count;
 }
 
-/* ---- patterns --------------------------------------------------------------------------------------------------- */
+/* ---- patterns of all types of cells ------------------------------------------------------------------------------ */
 
 static bool make_linear(int type, insitu_vertex_order order, session_pattern *out)
 {

@@ -16,12 +16,13 @@
 #include "session_region.h"
 #include "session_shape.h"
 
-/* The data for choosing pieces in cells of one type and number of nodes. */
+/* The data by which pieces are selected in cells of one type with one number of nodes. */
 typedef struct piece_kind {
     session_interpolation nodes;
     session_pattern pieces;
-    int corner_count; /* number of corners of a piece; 0 for pyramids, which are split into pyramids and tets */
-    int word_count;   /* number of words in session_piece_set.bits that a refined cell takes */
+    int corner_count; /* number of corners of each piece; 0 for pyramids, whose pieces are pyramids and tets */
+    /* number of 64-bit words of session_piece_set.bits for one refined cell, with one bit per piece */
+    int word_count;
 } piece_kind;
 
 typedef struct piece_work {
@@ -76,10 +77,11 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
     return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for sets of pieces of its cells", mesh->label);
 }
 
-/* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
+/* ---- pieces at the cell's own nodes ------------------------------------------------------------------------------ */
 
-/* Selects one piece at each of the cell's own nodes, whatever the order of the nodes in connectivity is, and all pieces
- * of pyramids. is_own: buffer of one flag per node of the finer lattice. out: receives the bits of the pieces. */
+/* Selects one piece at each of the cell's own nodes, or all pieces if the cell is a pyramid. The result is the same for
+ * any order of nodes in the connectivity. is_own: buffer of one flag per node of the finer lattice. out: bit i is set
+ * if piece i is selected. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;
@@ -101,7 +103,7 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
     }
 }
 
-/* Selects one piece at each of the own nodes of each marked cell. */
+/* Selects, in each marked cell, one piece at each of the cell's own nodes. */
 static bool fill_sets(const piece_work *w, const unsigned char *marks, int parts)
 {
     const int64_t cells = w->rows.cells.cell_count;
@@ -143,7 +145,7 @@ insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned c
     return is_made ? INSITU_OK : fail_for_memory(mesh, error);
 }
 
-/* ---- crossed pieces ---------------------------------------------------------------------------------------------- */
+/* ---- pieces that an isosurface or a plane may cross -------------------------------------------------------------- */
 
 static size_t find_buffer_size(const piece_work *w, int field_size)
 {
@@ -156,7 +158,8 @@ static size_t find_buffer_size(const piece_work *w, int field_size)
     return most + (size_t)field_size;
 }
 
-/* Selects the pieces that an isosurface may cross. values: the values at the nodes of the finer lattice. */
+/* Selects the pieces of a cell that an isosurface may cross. values: the values at the nodes of the finer lattice.
+ * bits: bit i is set if piece i is selected. */
 static void add_pieces(const piece_kind *kind, const session_isovalues *isovalues, const double *values, uint64_t *bits)
 {
     double most = 0;
@@ -251,8 +254,8 @@ static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *fa
     }
 }
 
-/* Returns the sets of pieces that find_pieces_on_faces() finds, one for each face of a cell. They are allocated by
- * base_alloc(); NULL if memory runs out. */
+/* Returns, for each face of a cell, a set of the pieces that have a face on it: kind->word_count words with one bit per
+ * piece. The array must be freed by base_free(); it is NULL if memory runs out. */
 static uint64_t *list_pieces_on_faces(const piece_kind *kind)
 {
     uint64_t *out = base_calloc(SHAPE_MOST_FACES * (size_t)kind->word_count, sizeof *out);

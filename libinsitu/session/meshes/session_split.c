@@ -21,20 +21,22 @@ enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
-    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of cell (type and number of nodes) */
-    bool is_of_type[LINEAR_TYPES];             /* for each linear type, set if some piece has this type */
-    int only_type;                             /* the type of all pieces; 0 if pieces have different types */
-    /* first_pieces: for each cell, the index of its first piece; first_entries: for each cell, the index of its first
-     * piece's first entry in piece_entries. A last element has the total. first_entries is NULL if all pieces have one
-     * type. */
+    /* for each kind of cell (type and number of nodes), the pieces into which it is split */
+    session_pattern patterns[ROWS_MOST_KINDS];
+    bool is_of_type[LINEAR_TYPES]; /* for each linear type, set if some piece has this type */
+    int only_type;                 /* the type of all pieces; 0 if pieces have different types */
+    /* first_pieces: for each cell, the index of its first piece; a last element has the number of pieces.
+     * first_entries: for each cell, the index in piece_entries at which the vertices of its pieces begin; a last
+     * element has the number of entries. first_entries is NULL if all pieces have one type. */
     int64_t *first_pieces, *first_entries;
     const session_piece_set *set; /* selects the pieces that are made of each cell */
-    /* set if a corner of a piece is stored as an entry of the caller's connectivity, instead of as a vertex */
+    /* true: piece_entries has, for each corner of a piece, the index of an entry of the caller's connectivity; false:
+     * the index of a vertex */
     bool stores_entries;
     grid_array piece_entries; /* connectivity of the pieces, piece by piece */
 } split_work;
 
-/* ---- the caller's cells ---------------------------------------------------------------------------------------- */
+/* ---- access to the caller's cells -------------------------------------------------------------------------------- */
 
 bool session_has_higher_order(const insitu_mesh *given)
 {
@@ -57,7 +59,7 @@ static const session_pattern *find_cell_pattern(const split_work *w, int64_t cel
     return &w->patterns[session_find_kind_of_cell(&w->rows, cell)];
 }
 
-/* ---- patterns and checks ---------------------------------------------------------------------------------------- */
+/* ---- lists of pieces by type of cell, and checks of the caller's cells ------------------------------------------- */
 
 static insitu_status describe_type(const session_mesh *mesh, int64_t cell, int type, int64_t count, base_error *error)
 {
@@ -120,7 +122,8 @@ static void find_only_type(split_work *w)
     if (types > 1) w->only_type = 0;
 }
 
-/* Finds the patterns of all cells. Returns an error for the first cell that has no pattern or has invalid offsets. */
+/* Makes the list of pieces (pattern) for each kind of cell in the mesh. Returns an error for the first cell that cannot
+ * be split or has invalid offsets. */
 static insitu_status find_patterns(split_work *w, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
@@ -182,7 +185,7 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
     return bad < cells ? describe_index(w, bad, error) : INSITU_OK;
 }
 
-/* ---- pieces of the cells --------------------------------------------------------------------------------------- */
+/* ---- making the pieces of all cells ------------------------------------------------------------------------------ */
 
 /* Computes, for each midpoint of a serendipity cell, the number of midpoints before it in the lexicographic order of
  * positions; midpoints at equal positions have equal numbers. */
@@ -211,7 +214,8 @@ typedef struct piece_walk {
 static piece_walk begin_piece_walk(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
-    /* The words of pyramids are not read: all pieces of a pyramid are made, because they have two types. */
+    /* All pieces of a pyramid are made, whatever its bits in the set are, because they have two types: pyramids and
+     * tets. */
     const bool has_words = first && first[cell] < first[cell + 1] && of->nodes.type != GRID_PYRAMID;
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }
@@ -332,9 +336,10 @@ static void store_cells(const split_work *w, int threads)
     }
 }
 
-/* ---- the topology ---------------------------------------------------------------------------------------------- */
+/* ---- storing the pieces as the cells that are read --------------------------------------------------------------- */
 
-/* Stores for each piece the index and the ghost flag of its cell, and the type and offset of the piece. */
+/* Stores, for each piece, the index and the ghost flag of the caller's cell that contains it, and the type and offset
+ * of the piece. */
 static void store_parents(const split_work *w, session_topology *t)
 {
     const insitu_mesh *given = &w->mesh->given;
@@ -421,7 +426,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     return status;
 }
 
-/* ---- counts of the caller's cells ------------------------------------------------------------------------------ */
+/* ---- numbers of the caller's cells that pieces belong to --------------------------------------------------------- */
 
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
 {

@@ -95,7 +95,8 @@ static void end_work(straight_work *w)
 }
 
 /* Returns whether all nodes of a cell are where the linear cell with the same corners has them. first: index in the
- * connectivity of the cell's first node. corners: positions of the corners. */
+ * connectivity of the cell's first node. weights: for each node, the weights of the corners whose weighted mean is the
+ * expected position. corners: positions of the corners. */
 static bool is_straight(const straight_work *w, const linear_positions *kind, int64_t first, const double (*weights)[8],
                         const double (*corners)[3], double tolerance)
 {
