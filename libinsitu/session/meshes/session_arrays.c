@@ -44,7 +44,7 @@ static insitu_status check_stride(const void *data, const char *name, int64_t co
         return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
                          (long long)stride, (long long)size);
     const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
-    /* number of strides from the first element to the last */
+    /* number of strides from the first element to the last; at least 1, because it is a divisor */
     const uint64_t steps = count > 1 ? (uint64_t)count - 1 : 1;
     const bool fits = count == 0 || step <= most_bytes / steps;
     if (!fits || (stride < 0 && count && step * steps > (uintptr_t)data))

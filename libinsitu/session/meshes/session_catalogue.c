@@ -22,10 +22,10 @@
 #include "session_hash.h"
 #include "session_keys.h"
 
-/* ---- a rank's table as text ---------------------------------------------------------------------------------- */
+/* ---- writing this rank's table of meshes and fields -------------------------------------------------------------- */
 
-/* Appends a line to the text, which has `at` bytes so far, if it fits within `capacity` bytes. Returns the size of the
- * text including the line, even if the line does not fit. */
+/* Appends the line "kind a b name" to the text, which has `at` bytes so far, if it fits within `capacity` bytes.
+ * Returns the size of the text including the line, even if the line does not fit. */
 static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
 {
     const size_t space = at < capacity ? capacity - at : 0;
@@ -38,7 +38,7 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-/* The properties of all of this rank's parts of a mesh together, which the rank's table lists. */
+/* The properties of a mesh that this rank's table lists, found from all of this rank's parts of the mesh. */
 typedef struct part_summary {
     bool is_given, has_cells, has_ids, is_refined;
     const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
@@ -103,8 +103,8 @@ static void find_field_problem(const session_parts *parts, const session_field *
     }
 }
 
-/* Iterator over the fields of the parts. Each field is visited once, on the first part that has it. part, next: index
- * of the part, and of the field on this part, at which the search for the next field begins. */
+/* Iterator over the fields of this rank's parts of a mesh. Each field is visited once, on the first part that has it.
+ * part, next: indices of the part, and of the field on this part, at which the search for the next field begins. */
 typedef struct field_visit {
     const session_parts *parts;
     int part, next;
@@ -186,7 +186,7 @@ uint64_t session_hash_names(const session_meshes *meshes)
     return hash;
 }
 
-/* ---- texts to a catalogue ------------------------------------------------------------------------------------ */
+/* ---- reading tables into the catalogue --------------------------------------------------------------------------- */
 
 void session_hanging_free(session_hanging *hanging, bool with_borders)
 {
@@ -279,8 +279,8 @@ static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, con
     return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, compare_mesh_names);
 }
 
-/* Finds the names of the meshes in the tables of all ranks; a mesh of several ranks is found several times. `names`
- * receives pointers into the text, unless it is NULL. Returns the number of names found. */
+/* Finds the names of meshes in a text that consists of the tables of all ranks; a mesh that several ranks have is found
+ * several times. names: receives pointers into the text, unless it is NULL. Returns the number of names found. */
 static size_t list_names(const char *text, size_t size, const char **names)
 {
     size_t count = 0;
@@ -468,7 +468,7 @@ void session_catalogue_drop_derived(session_catalogue *catalogue)
     catalogue->are_derived = false;
 }
 
-/* ---- tables of all ranks ------------------------------------------------------------------------------------- */
+/* ---- gathering the tables of all ranks --------------------------------------------------------------------------- */
 
 typedef struct gathered_tables {
     char *own_table, *tables;
@@ -579,7 +579,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     return INSITU_OK;
 }
 
-/* ---- home ranks ------------------------------------------------------------------------------------------------ */
+/* ---- updating home ranks ----------------------------------------------------------------------------------------- */
 
 /* Computes two hashes for this rank's parts of a mesh: hashes[0] from the stamps at which their cells last changed,
  * hashes[1] from the stamps at which their coordinates last changed. Both are 0 if this rank has no part. The caller

@@ -41,7 +41,7 @@ typedef struct cell_rows {
     const grid_array *connectivity;
     int64_t count;       /* number of entries that belong to cells */
     int64_t row_length;  /* number of entries in each row */
-    int64_t used_length; /* number of entries of each row that are read */
+    int64_t used_length; /* number of entries at the start of each row that list vertices of the cell */
 } cell_rows;
 
 static int64_t read_entry(const cell_rows *rows, int64_t i)
@@ -62,8 +62,8 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     return rows;
 }
 
-/* Returns whether all entries fit into 4 bytes. An entry that does not fit, in a mesh with few vertices, is an invalid
- * index. The entries are then copied with 8 bytes, so that the error message shows this index. */
+/* Returns whether all entries fit into 4 bytes; otherwise the entries are copied with 8 bytes. An entry that does not
+ * fit may be an invalid index; with 8 bytes it is copied unchanged, so that the error message shows it. */
 static bool do_entries_fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
@@ -81,8 +81,8 @@ static bool do_entries_fit_in_32_bits(const cell_rows *rows, int threads)
     return least >= INT32_MIN && most <= INT32_MAX;
 }
 
-/* Computes the index of the cell's first vertex in the copied connectivity; returns false if the cell's offsets are
- * bad. */
+/* Finds the entry of the copied connectivity with the cell's first vertex. count: number of the cell's vertices;
+ * entries: total number of entries. Returns false if the cell's offsets are invalid. */
 static bool locate_cell(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
 {
     *first = cell * count;

@@ -52,12 +52,13 @@ typedef enum face_fault {
 } face_fault;
 
 typedef struct face_fault_details {
-    int64_t count;         /* number of the cell's faces */
-    int64_t face;          /* index of the faulty face, counted from 0 */
-    int64_t first, end;    /* start and end of the face's vertices in face_connectivity */
-    int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
-    int sharing;           /* number of faces that have the edge */
-    double position[3];    /* coordinates of the faulty vertex */
+    int64_t count;      /* number of the cell's faces */
+    int64_t face;       /* index of the invalid face, counted from 0 */
+    int64_t first, end; /* start and end of the face's vertices in face_connectivity */
+    /* index of the invalid vertex (vertex), or of the two ends of an edge (vertex and other) */
+    int64_t vertex, other;
+    int sharing;        /* number of faces that have the edge between `vertex` and `other` */
+    double position[3]; /* coordinates of the faulty vertex */
 } face_fault_details;
 
 static void free_edge_buffer(edge_buffer *buffer)
@@ -155,7 +156,8 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                                     const face_fault_details *details, base_error *error)
 {
     const char *name = mesh->label;
-    const long long base = mesh->given.index_base; /* indices and offsets are reported in the caller's numbering */
+    /* index of the first element in the caller's numbering; it is added to all indices and offsets in messages */
+    const long long base = mesh->given.index_base;
     const long long at = cell, face = details->face + base, vertex = details->vertex + base;
     switch (fault) {
     case FACES_NO_MEMORY:
@@ -197,7 +199,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
     return INSITU_OK;
 }
 
-/* ---- cells of any type ---------------------------------------------------------------------------------------- */
+/* ---- checks of cells of any type --------------------------------------------------------------------------------- */
 
 enum { BLOCK_CELLS = 4096 };
 
@@ -205,8 +207,8 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 
 typedef struct fault_details {
     int type;
-    int64_t first, end; /* start and end offset of the cell */
-    int64_t vertex;     /* index of the faulty vertex, counted from 0 */
+    int64_t first, end; /* the cell's offset, and the offset of the next cell */
+    int64_t vertex;     /* index of the invalid vertex, counted from 0 */
     double position[3];
     face_fault fault_of_faces;
     face_fault_details faces;
@@ -354,8 +356,8 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* Checks a bad cell a second time and reports its error. If the second check finds no error, memory ran out in the
- * first check. */
+/* Checks an invalid cell a second time and returns its error with a message. If the second check finds no error, memory
+ * ran out in the first check, and this is reported. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_details details = {0};
@@ -403,7 +405,8 @@ static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, i
     return cell;
 }
 
-/* Checks all cells in parallel. Returns the lowest bad cell, or cell_count if all are valid. */
+/* Checks all cells in parallel and adds them to *tally. Returns the lowest index of an invalid cell, or cell_count if
+ * all are valid. */
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
@@ -419,8 +422,8 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            /* The fast check stops at a bad cell, or at a polygon, which it cannot check; the remaining cells of the
-             * block are checked one by one. */
+            /* run() stops at an invalid cell, or at a cell that it cannot check, such as a polygon. The remaining cells
+             * of the block are then checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
             if (at < end) at = check_cells_one_by_one(mesh, at, end, &buffer, &mine);
             if (at < end) first_bad = at;
@@ -572,7 +575,7 @@ static insitu_status describe_misfit(const session_mesh *mesh, base_error *error
                      (long long)own);
 }
 
-/* Checks a mesh. If cells are invalid, the topology computed from them is dropped, because the caller may correct the
+/* Checks a mesh. If it is invalid, the topology computed from its cells is dropped, because the caller may correct the
  * arrays in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {

@@ -39,15 +39,16 @@ static conform_array find_array(insitu_mesh *m, int number)
     }
 }
 
-/* Returns int32 or int64: the type in which indices of the given type are read, in place or from a copy. below: upper
- * bound of valid indices. */
+/* Returns the type in which indices of the given type are read, in place or from a copy: int32 or int64. below: an
+ * upper bound of valid indices. */
 static insitu_type choose_index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;
     return type == INSITU_UINT32 && below > INT32_MAX ? INSITU_INT64 : INSITU_INT32;
 }
 
-/* Returns the type in which the array is read. *is_copied is set if it must be read from a copy. */
+/* Returns the type in which the array is read. has_map: the caller numbers cell types in its own way. *is_copied is set
+ * if the array must be read from a copy. */
 static insitu_type choose_conformed_type(const conform_array *of, bool has_map, bool *is_copied)
 {
     const insitu_type type = of->array->type;

@@ -14,8 +14,8 @@ enum { MOST_SAMPLES = 1024 };
 /* The data that each rank sends to all other ranks so that they can find homes. */
 typedef struct rank_part {
     session_box box;
-    int64_t first_id; /* first id of the range of ids whose home is this rank */
-    /* nonzero if this rank has vertices with global ids, and first_id is set */
+    int64_t first_id; /* first global id of the range of ids whose home is the rank that sends this struct */
+    /* nonzero if first_id is set, because the rank has vertices with global ids; 0 otherwise */
     int64_t has_ids;
 } rank_part;
 

@@ -12,7 +12,7 @@
 
 static const char axis_name[3] = {'i', 'j', 'k'};
 
-/* ---- descriptions -------------------------------------------------------------------------------------------- */
+/* ---- checks of the description of a lattice ---------------------------------------------------------------------- */
 
 static int64_t count_vertices_along(const insitu_lattice *l, int axis)
 {
@@ -65,8 +65,8 @@ static insitu_status check_cells(const insitu_lattice *l, base_error *error)
                      (long long)l->cells[0], (long long)l->cells[1], (long long)l->cells[2]);
 }
 
-/* Stores the axes in `order`, sorted by stride; an axis with a single index comes first, because its stride is never
- * used. */
+/* Sorts the three axes by stride, and stores their indices in `order`. counts: number of elements along each axis. An
+ * axis with a single element comes first, because its stride is never used. */
 static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -78,13 +78,14 @@ static void order_axes(const int64_t strides[3], const int64_t counts[3], int or
     }
 }
 
-/* Checks that each stride is at least the extent of the next smaller one (nested strides), and that all count[0] x
- * count[1] x count[2] elements lie within the array. */
+/* Checks that no two of the counts[0] x counts[1] x counts[2] elements have the same index, and that all indices are
+ * below `length`. Indices are different because each stride must exceed the largest index that the axes with smaller
+ * strides can reach. */
 static insitu_status check_strides(const char *what, const int64_t strides[3], const int64_t counts[3], int64_t length,
                                    base_error *error)
 {
     int order[3];
-    int64_t reach = 1; /* the number of elements from the first to the last one along the axes processed so far */
+    int64_t reach = 1; /* 1 plus the largest index that is reached along the axes processed so far */
     order_axes(strides, counts, order);
     for (int i = 0; i < 3; i++) {
         const int axis = order[i];
@@ -260,7 +261,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
         memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
     const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
-    /* the set of covered cells may have changed, in this block and in coarser blocks */
+    /* the set of cells that finer blocks cover may have changed, in this block and in coarser blocks */
     if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_all_zero(a->refinement)))
         changes |= INSITU_CHANGED_TOPOLOGY;
     for (int axis = 0; axis < 3; axis++)
@@ -270,7 +271,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
     return changes;
 }
 
-/* ---- the grid ------------------------------------------------------------------------------------------------ */
+/* ---- the grid that reads a lattice ------------------------------------------------------------------------------- */
 
 static grid_numbering make_numbering(const int64_t strides[3], const int64_t counts[3])
 {

@@ -1,6 +1,6 @@
-/* The set calls store meshes and fields in the table of meshes. Only descriptions are checked here; the arrays are read
- * by a step. An error is returned immediately. It is also stored with the mesh or the field until the mesh or field is
- * set again, so that the next step can return it on every rank. */
+/* insitu_set_mesh() and insitu_set_block() check the description of a mesh or block and store it in the table of
+ * meshes. The contents of arrays are not read here, but by the next step. An error is returned immediately. It is also
+ * stored with the mesh until the mesh is set again, so that the next step can return it on every rank. */
 #include "session_mesh_input.h"
 
 #include <stdio.h>
@@ -41,7 +41,7 @@ void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type typ
     }
 }
 
-/* ---- descriptions -------------------------------------------------------------------------------------------- */
+/* ---- checks of the description of a mesh ------------------------------------------------------------------------- */
 
 static insitu_status check_count(const char *name, int64_t count, int64_t most, base_error *error)
 {
@@ -125,8 +125,8 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks the face lists, an array of pointers. The array's type is the type of the elements to which the pointers
- * point. */
+/* Checks the face lists: an array with one pointer per face, to the indices of the face's vertices. The type in the
+ * description of this array is the type of these indices. */
 static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_array *lists = &mesh->face_lists;
@@ -359,10 +359,10 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
            session_lattice_changes(a->lattice, b->lattice);
 }
 
-/* ---- meshes -------------------------------------------------------------------------------------------------- */
+/* ---- storing descriptions in the table of meshes ----------------------------------------------------------------- */
 
-/* Makes the mesh read its finer lattices (session_finer.h) again after the caller has set a new description, unless
- * cells or coordinates have changed. In that case the finer lattices are dropped. */
+/* Called after the caller has set a new description, which is in mesh->given. If cells or coordinates have changed,
+ * frees the finer lattices (session_finer.h). Otherwise makes the mesh read them again. */
 static void restore_finer_lattices(session_mesh *mesh, unsigned changed)
 {
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);

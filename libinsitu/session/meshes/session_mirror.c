@@ -20,8 +20,8 @@ static bool is_mirrored(const session_mesh *image, int axis)
 
 /* ---- coordinates by vertex --------------------------------------------------------------------------------------- */
 
-/* Returns a bit mask of the axes along which the mirror image stores its own coordinates. These are the mirrored axes,
- * or all axes if the source's coordinates are interleaved or strided. */
+/* Returns a bit mask of the axes along which the mirror image stores its own coordinates: bit i stands for axis i.
+ * These are the mirrored axes, or all axes if the source's coordinates are interleaved or strided. */
 static int find_own_axes(const session_mesh *image)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -92,7 +92,7 @@ static bool mirror_lattice(session_mesh *image)
     return true;
 }
 
-/* ---- the image --------------------------------------------------------------------------------------------------- */
+/* ---- the mirror image -------------------------------------------------------------------------------------------- */
 
 /* Describes the image's lattice. The description has no levels of refinement, because the image shares the source's
  * flags of covered cells. */

@@ -123,12 +123,13 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     }
 }
 
-/* Upper bound of the rounding error of the volume of a tet formed by a triangle and a vertex in the same plane, as a
- * fraction of the volume of the cell's bounding box. With u = 2^-53: an edge is computed by three differences, each
- * with an error of u times the box's side (the mean of the vertices cancels). The six products of three edges of a
- * determinant add 9 u, and products and sums another 2 u and 3 u: 6 times 14 u, divided by 6. The bound of 32 u leaves
- * a margin for the sum over triangles, whose number is small compared to 1 / u, for the box's own rounding, and for
- * squares of u. */
+/* Upper bound of the rounding error of the volume of a tet whose exact volume is 0, as a fraction of the volume of the
+ * cell's bounding box. The volume is a sixth of a sum of six products. Each product has three factors: components of
+ * the tet's edges along the three axes. Let u be 2^-53. A component is computed by three subtractions, each with an
+ * error of at most u times the box's side, so the three factors add an error of 9 u to each product. Its two
+ * multiplications add 2 u, and the up to three additions of products 3 u. The error of the volume is therefore at most
+ * 6 (9 + 2 + 3) u / 6 = 14 u. The bound of 32 u leaves a margin for the sum over triangles, whose number is small
+ * compared to 1 / u, for the rounding of the box's volume, and for squares of u. */
 static const double flat_share = 0x1p-48;
 
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)

@@ -426,7 +426,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     return status;
 }
 
-/* ---- numbers of the caller's cells that pieces belong to --------------------------------------------------------- */
+/* ---- counts of the caller's cells -------------------------------------------------------------------------------- */
 
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
 {

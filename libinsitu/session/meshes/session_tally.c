@@ -54,12 +54,14 @@ double tally_signed_volume(int type, double points[][3])
     return signed_volume(type, points);
 }
 
-/* Upper bound of the rounding error of the volume of a flat cell, as a fraction of the volume ex ey ez of its bounding
- * box. With u = 2^-53: a determinant is six products of one component along each axis, none longer than the box, and
- * each has at most 8 roundings (3 of edges, 2 of products, 3 of sums), so its error is at most 48 u of the box. The sum
- * of n determinants has n - 1 more roundings of 6 boxes each, and is divided by a divisor d: (8 + n - 1) 6 n / d, which
- * is 8 u for a tet, 90 u for a hex, 39 u for a wedge, 22 u for a pyramid. The bound of 128 u leaves a margin for the
- * division's rounding, the box's own rounding and squares of u. */
+/* Upper bound of the rounding error of the volume of a cell whose exact volume is 0, as a fraction of the volume b of
+ * its bounding box. The volume is a sum of n determinants, divided by d (session_corners.h). A determinant is a sum of
+ * six products of three edge components, one along each axis; each product is at most b. Let u be 2^-53. A product has
+ * at most 8 roundings: 3 of its components, 2 in multiplications, 3 in additions. The error of a determinant is
+ * therefore at most 48 u b. The sum of n determinants is at most 6 n b, and its n - 1 additions have an error of u
+ * times this each. The error of the volume is thus at most (8 + n - 1) 6 n u b / d: 8 u b for a tet (n = 1, d = 6), 90
+ * u b for a hex (n = 8, d = 8), 39 u b for a wedge (n = 6, d = 12), 22 u b for a pyramid (n = 4, d = 12). The bound of
+ * 128 u leaves a margin for the rounding of the division and of the box's volume, and for squares of u. */
 static const double flat_share = 0x1p-46;
 
 MMBVH_INLINE bool is_flat_volume(double volume, double box)
@@ -163,11 +165,11 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     tally->flat_count += is_flat_cell;
 }
 
-/* ---- corners with different signs ---------------------------------------------------------------------------- */
+/* ---- cells whose corners have different signs -------------------------------------------------------------------- */
 
-/* A corner counts as flat if the determinant of its edges (of a quad: the area of its parallelogram) is less than this
- * fraction of the largest one in the cell. Hexes with two coincident vertices, and cells with a vertex on a nearly
- * straight edge, have such corners. */
+/* The sign of a corner is ignored if the determinant of the three edges at the corner (at the corner of a quad: the
+ * area of the parallelogram of its two edges) is less than this fraction of the largest one in the cell. Hexes with two
+ * coincident vertices, and cells with a vertex on a nearly straight edge, have such corners. */
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
@@ -211,7 +213,7 @@ bool tally_is_flat(const grid *g, int64_t cell)
     return one.flat_count > 0;
 }
 
-/* ---- runs of cells ----------------------------------------------------------------------------------------------- */
+/* ---- tallies of consecutive cells -------------------------------------------------------------------------------- */
 
 MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int count)
 {
@@ -266,8 +268,8 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     return true;
 }
 
-/* Returns the longest run of cells, starting with `cell`, in which all cells have the same type and their vertices are
- * contiguous. Vectorized code can process such a run. */
+/* Returns the longest sequence of consecutive cells, starting with `cell`, that have the same type and whose vertices
+ * are contiguous in the connectivity. Vectorized code can process such a sequence. */
 MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
     const grid *g = &mesh->cells;
@@ -278,7 +280,7 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
     if (next > cell) alike.first_entry = fetch_first_entry(g, cell, count, shape);
-    alike.count = next > cell ? next - cell : 1; /* a cell with bad offsets is a run by itself */
+    alike.count = next > cell ? next - cell : 1; /* a cell with invalid offsets is a sequence by itself */
     return alike;
 }
 
@@ -290,9 +292,9 @@ typedef struct lattice_row {
     int32_t vertices[ROW_CELLS * GRID_MAX_CELL_VERTICES];
 } lattice_row;
 
-/* Returns the run of cells of a lattice that begins with `cell` and stays in one row, and writes the run's connectivity
- * into the buffer. If `cell` is not drawn, or if the lattice's cells are not consecutive along any axis, the run is
- * this cell only, without connectivity in the buffer. */
+/* Returns a sequence of consecutive cells of a lattice that begins with `cell` and stays in one row, and writes the
+ * connectivity of these cells into the buffer. If `cell` is not drawn, or if cell indices are not consecutive along any
+ * axis, the sequence is this cell only, without connectivity in the buffer. */
 static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
 {
     const grid *g = &mesh->cells;
@@ -317,13 +319,13 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to *t with vectorized code, and lowers *least to the smallest absolute volume of
- * these cells. Returns the number of cells that were added. *alone receives the number of following cells that must be
- * added one by one. */
+/* Adds the first cells of the sequence to *t by vectorized code, and lowers *least to the smallest absolute volume of
+ * these cells if that is smaller. Returns the number of cells that were added. *alone receives the number of cells
+ * after them that must be added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    /* a run whose grid has a lattice consists of a single cell (find_row_run()) */
+    /* a sequence whose grid has a lattice consists of a single cell (find_row_run()) */
     if (alike->count < LANES || alike->g->lattice) return 0;
     lane_run *const run = session_find_lane_run(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
@@ -357,9 +359,10 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 
 /* The lengths of the drawn cells along one axis. */
 typedef struct axis_lengths {
-    /* number of cells with a positive length, and number with a negative length; other lengths are 0 */
+    /* number of cells whose length along the axis is positive, and number of cells whose length is negative; the length
+     * of all other cells is 0 */
     int64_t positive_count, negative_count;
-    double size_sum; /* sum of the cube roots of the lengths */
+    double size_sum; /* sum of the cube roots of the cells' absolute lengths along the axis */
     double lower, upper;
 } axis_lengths;
 
@@ -408,7 +411,8 @@ bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally)
     return true;
 }
 
-/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice to *tally. These cells are boxes, or are flat. */
+/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice, which are axis-aligned boxes or rectangles or
+ * have no volume, to *tally. Returns `end`. */
 static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;

@@ -30,7 +30,7 @@
 #include "session_split.h"
 #include "session_tally.h"
 
-/* ---- the grid --------------------------------------------------------------------------------------------------- */
+/* ---- arrays that the grid reads ---------------------------------------------------------------------------------- */
 
 void session_select_grid_arrays(session_mesh *mesh)
 {
@@ -80,7 +80,7 @@ int session_caller_type(const session_mesh *mesh, int64_t cell)
     return grid_cell_type(&given, session_caller_cell(mesh, cell));
 }
 
-/* ---- faces' vertices from several lists ------------------------------------------------------------------------ */
+/* ---- vertices of faces that the caller gives in several lists ---------------------------------------------------- */
 
 session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face)
 {
@@ -163,10 +163,10 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
+/* ---- faces of cells from the owners and neighbours of faces ------------------------------------------------------ */
 
-/* Stands for a cell that this rank does not have: a halo cell, or the missing cell of a face in the caller's separate
- * list of boundary faces. */
+/* Value of a cell index for a cell that this rank does not have: a halo cell, or the missing cell of a face in the
+ * caller's separate list of boundary faces. */
 static const int64_t outside = INT64_MIN;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given)
@@ -228,8 +228,9 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
     return INSITU_OK;
 }
 
-/* Converts counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the
- * start of the next cell; the last loop shifts the offsets back. */
+/* Converts the numbers of faces in t->offsets into offsets, and then stores the index of each face in the lists of its
+ * cells. Storing a face advances the offset of its cell, which finally is the offset of the next cell; the last loop
+ * shifts all offsets back. */
 static void store_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
@@ -270,7 +271,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- recognition of one polyhedron ------------------------------------------------------------------------------- */
+/* ---- recognition of a polyhedron as a tet, hex, wedge or pyramid ------------------------------------------------- */
 
 enum { MOST_FACES = 6 };
 
@@ -279,7 +280,8 @@ typedef struct face_ring {
     int64_t vertex[4];
 } face_ring;
 
-/* Reads a face's vertices. Returns false if the face does not exist, or does not have 3 or 4 vertices. */
+/* Reads a face's vertices. Returns false if the face does not exist, has a vertex that does not exist, or does not have
+ * 3 or 4 vertices. */
 static bool read_face_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 {
     const grid *g = &mesh->cells;
@@ -337,7 +339,8 @@ static bool are_distinct(const int64_t *vertices, int count)
     return true;
 }
 
-/* Constructs the cell on the given base, whose sides must have side_size vertices. vertices: receives the cell's
+/* Constructs a tet, hex, wedge or pyramid from its faces. rings: the `count` faces; base: index of the face that is the
+ * base; side_size: number of vertices that each face with an edge of the base must have. vertices: receives the cell's
  * vertices in VTK's order, except that the cell may be left-handed. Returns false if the faces do not form such a
  * cell. */
 static bool build_on_base(const face_ring *rings, int count, int base, int side_size,
@@ -384,8 +387,8 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
     if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
 }
 
-/* Returns the type of cell that a polyhedron's faces form, with its vertices in that type's order. Returns
- * GRID_POLYHEDRON if the faces do not form a tet, hex, wedge or pyramid. */
+/* Returns the type of cell that a polyhedron's faces form: a tet, hex, wedge or pyramid, whose vertices are stored in
+ * `vertices` in VTK's order; GRID_POLYHEDRON if the faces form none of these. */
 static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {
@@ -416,11 +419,11 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
 enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
-    bool is_faulty; /* set if some cell is invalid */
+    bool is_faulty; /* set if some cell of the mesh is invalid, so that no polyhedron is recognized */
     /* polyhedron_count: number of polyhedra that the caller gave; recognised_count: number of these polyhedra that are
      * read as another type */
     int64_t polyhedron_count, recognised_count;
-    int64_t type_counts[TYPES]; /* for each type, number of cells that are read as this type */
+    int64_t type_counts[TYPES]; /* for each type, the number of cells that will be read as this type */
     int64_t entry_count;        /* number of connectivity entries of all cells after recognition */
     unsigned char *types;
 } recognition;

@@ -89,7 +89,7 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
                                        has_z ? ALL : IN_PLANE, types, &warp->bytes, is_new);
 }
 
-/* The coordinates along one axis before and after the move. */
+/* The arrays of coordinates along one axis before and after vertices are moved. */
 typedef struct moved_axis {
     grid_array from;
     /* displacements along the axis, one per tuple of the field; without data, vertices do not move along the axis */
@@ -105,8 +105,8 @@ static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex
     return session_store_coordinate(axis->to, vertex, coordinate);
 }
 
-/* Moves all vertices. *bad becomes the first vertex whose index is out of range, or the number of vertices if there is
- * none. Returns whether a coordinate has changed. */
+/* Moves all vertices. *bad becomes the first vertex for which the index of its tuple is out of range, or the number of
+ * vertices if there is none. Returns whether a coordinate has changed. */
 static bool move_vertices(const session_mesh *mesh, const session_displacement *by, const moved_axis axes[3],
                           int threads, int64_t *bad)
 {
@@ -144,7 +144,8 @@ static insitu_status describe_index(const session_mesh *mesh, const session_disp
                      base);
 }
 
-/* Computes the moved coordinates from the coordinates that the caller described. */
+/* Computes the moved coordinates from the caller's coordinates. *differ is set if a moved coordinate has changed or its
+ * memory is new. */
 static insitu_status compute_coordinates(session_mesh *mesh, const session_displacement *by, int threads, bool *differ,
                                          base_error *error)
 {
