@@ -54,8 +54,8 @@ static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
 /* ---- polynomials on one simplex ---------------------------------------------------------------------------------- */
 
-/* Lists the nodes of a simplex's lattice of this order, each by its barycentric coordinates times the order. If out is
- * NULL, the nodes are only counted. Returns their number. */
+/* Lists the nodes of the regular lattice of this order on a simplex, and returns the number of nodes. out: the
+ * barycentric coordinates of each node times the order; NULL: nodes are only counted. */
 static int list_nodes(int dimensions, int order, int (*out)[4])
 {
     int count = 0;
@@ -85,7 +85,8 @@ static int find_node(int dimensions, int order, const int node[4])
     return at;
 }
 
-/* Computes the Bernstein polynomial with these exponents at barycentric coordinates; 0 if an exponent is negative. */
+/* Returns the value, at the barycentric coordinates `at`, of the Bernstein polynomial with these exponents; 0 if an
+ * exponent is negative. */
 static double bernstein_value(const int exponents[4], const double at[4])
 {
     double value = 1;
@@ -97,7 +98,8 @@ static double bernstein_value(const int exponents[4], const double at[4])
     return value;
 }
 
-/* Computes the derivative of the Bernstein polynomial along the edge from corner 0 to corner axis + 1. */
+/* Returns the derivative of the Bernstein polynomial with these exponents along the edge from corner 0 to corner axis +
+ * 1, at the barycentric coordinates `at`. */
 static double bernstein_slope(int order, const int exponents[4], int axis, const double at[4])
 {
     int raised[4], lowered[4];
@@ -645,9 +647,9 @@ static double find_volume(const session_bound *of, const double *tuples)
     return of->axis_count < 3 ? 0 : share * fabs(vector3_dot(cross, axes[2])) / (counts[0] * counts[1] * counts[2]);
 }
 
-/* Finds the mean gradient of the field over the nodes of the finer lattice. In straight cells the gradient is set to 0,
- * because positions in a cell and in its pieces differ only by rounding, so that it is not needed. In other cells it
- * may be not finite. */
+/* Finds the mean gradient of the field over the nodes of the finer lattice. The gradient is not needed in straight
+ * cells, in which the positions given by the polynomial and by the pieces differ only by rounding; it is then set to 0.
+ * In other cells it may be not finite. */
 static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, double out[3])
 {
     static const double straight = 1e-6;

@@ -110,8 +110,8 @@ typedef struct session_cell_bound {
      * position is not finite; all other members are then undefined. */
     bool is_crossed;
     double node_distance; /* distance between neighbouring nodes on an edge: root mean square over the cell's edges */
-    /* upper bound of the distance between the positions that the cell and its pieces give to the same point of the
-     * reference cell */
+    /* upper bound of the distance between the two positions of a point of the reference cell: by the polynomial of
+     * positions, and by linear interpolation in the pieces */
     double position_error;
     /* upper bound of the distance between the isosurfaces of the cell's polynomial and those of its linear pieces;
      * INFINITY if the gradient may vanish near an isosurface */

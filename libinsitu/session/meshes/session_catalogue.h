@@ -27,8 +27,8 @@ typedef struct session_catalogue_field {
 typedef struct session_hanging_vertex {
     /* index, in session_vertex_groups, of the group of equal vertices that contains the hanging vertex */
     int64_t group;
-    /* for each corner of the face, the index of its group of equal vertices or, if is_received is set, the index of its
-     * value among the values received from other ranks */
+    /* one entry for each corner of the coarser cell's face: the index of the corner's group of equal vertices or, if
+     * is_received is set, the index of the corner's value among the values received from other ranks */
     int64_t corners[4];
     double weights[4]; /* weight of the value at each corner; the weights sum to 1 */
     bool is_received; /* set if `corners` are indices of values received from other ranks, not of groups of this rank */
@@ -48,8 +48,9 @@ typedef struct session_border {
     uint64_t cells_hash;
     int64_t face_count, vertex_count;
     session_face *faces; /* faces that belong to only one cell of the whole mesh, on all ranks */
-    int64_t *vertices; /* vertices of the faces that belong to only one cell of this rank; only these vertices may hang
-                          on faces */
+    /* indices of the vertices of all faces that belong to only one cell of this rank; other vertices cannot be hanging
+     * vertices */
+    int64_t *vertices;
     /* number of entries of `twins`, which are computed again if vertices move (session_hanging.twins_version) */
     int64_t twin_count;
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
@@ -79,7 +80,8 @@ typedef struct session_vertex_groups {
     /* for each part of a mesh, the index of its first vertex in group_of_vertex; a final entry is the number of
      * vertices of all parts */
     int64_t *first_vertices;
-    /* for each vertex of all parts, the index of its group; -1: the vertex belongs to no drawn cell */
+    /* for each vertex of all parts, the index of its group of equal vertices; -1: the vertex belongs to no drawn
+     * cell */
     int64_t *group_of_vertex;
     int64_t count; /* number of groups */
     /* prefix sums of the numbers of cell corners in groups: for each group, the number of corners of drawn cells whose
@@ -93,7 +95,7 @@ typedef struct session_vertex_groups {
      * ranks, session_homes.h). There are none if there is only one rank. */
     int64_t shared_count;     /* number of groups whose positions lie in other ranks' boxes */
     int64_t *shared_groups;   /* index of each shared group */
-    session_key *shared_keys; /* key by which each shared group is found on its home rank */
+    session_key *shared_keys; /* for each shared group, the key by which its home rank identifies it */
     int64_t *shared_counts;   /* for each rank, the number of shared groups whose home rank it is */
 } session_vertex_groups;
 
@@ -151,7 +153,7 @@ typedef struct session_catalogue {
     bool is_known;           /* set if the catalogue has been computed since the session began */
     bool has_faults;         /* set if some mesh or field has an error */
     bool are_derived;        /* set if the catalogue contains the derived fields of the current scene */
-    bool are_meshes_grouped; /* set if the mesh groups are those of the current scene */
+    bool are_meshes_grouped; /* set if mesh_groups contains the mesh groups of the current scene */
     bool are_hashes_known;   /* set if cells_hash and positions_hash of all meshes are up to date */
     /* an error that belongs to no known mesh, or lack of memory on some rank, because of which no image can be drawn;
      * NULL: there is no such error */
@@ -161,8 +163,9 @@ typedef struct session_catalogue {
     session_mesh_group **mesh_groups;
 } session_catalogue;
 
-/* Updates the catalogue. is_shared: all ranks have the same meshes and fields (equal session_hash_names()), and no mesh
- * or field has an error. Meshes with an error are excluded from the step. Collective. */
+/* Builds the catalogue from the tables of all ranks. is_shared: all ranks have the same meshes and fields (equal
+ * session_hash_names()), and no mesh or field has an error; the tables are then not exchanged. Meshes with an error are
+ * excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
@@ -191,7 +194,7 @@ static inline uint64_t session_find_group_name_of_mesh(const session_catalogue_m
     return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;
 }
 
-/* Returns the mesh group with this hash as its `name`, or NULL if there is none. */
+/* Returns the mesh group whose member `name`, a hash, has this value; NULL if there is none. */
 session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name);
 void session_drop_mesh_groups(session_catalogue *catalogue);
 /* Frees the data of the hanging vertices and, if with_borders is set, the lists of outer faces (session_border). */

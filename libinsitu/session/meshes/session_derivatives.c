@@ -37,7 +37,8 @@ typedef struct term_list {
     int count;
     /* [i][j]: derivative at node i of the Lagrange polynomial that is 1 at node j * parts of a line */
     double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
-    /* [n][i]: B_n(i / parts) and its derivative, as defined at the top of this file */
+    /* [n][i]: value and derivative, at t = i / parts, of the polynomial B_n(t) that is defined at the top of this
+     * file */
     double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE], slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
 } term_list;
 
@@ -72,7 +73,7 @@ void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODE
     }
 }
 
-/* Computes list->lines, the derivatives of the Lagrange polynomials of a line at its nodes. */
+/* Computes list->lines, the derivatives of the Lagrange polynomials of one variable at the nodes of an edge. */
 static void compute_line_derivatives(term_list *list, bool is_lobatto)
 {
     const int p = list->order_of_polynomial, parts = list->parts;

@@ -35,14 +35,15 @@ typedef struct session_deviation_request {
                                     from the plane */
     const session_plane *plane;
     session_pixels pixels;
-    bool is_of_values; /* set if the range of the field's values is measured, instead of the error of its isosurfaces */
+    /* true: the range of the field's values is measured; false: the error of its isosurfaces, or of positions */
+    bool is_of_values;
     /* callback for each cell if is_of_values is set; its first argument is `of_values`. Several threads may call it at
      * once. NULL: only the range of the values is needed. */
     void (*use_cell)(void *of, const session_value_cell *cell);
     void *of_values;
     /* set if nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are equispaced */
     bool is_lobatto;
-    bool marks_only; /* true: cells are only marked in `marks`, and not measured */
+    bool marks_only; /* true: cells are only marked in `marks`, and their errors are not computed */
     /* one byte per cell, which is set if an isosurface or the plane may cross the cell; NULL: cells are not marked */
     unsigned char *marks;
     /* if positions are measured: one byte per cell, nonzero if the cell is measured; NULL: all cells are measured */
@@ -58,8 +59,8 @@ void session_read_request_values(const session_rows *rows, const session_deviati
 typedef struct session_deviation {
     /* largest error bound of all measured cells, in pixels, for cells that are split only between their own nodes */
     double error;
-    /* cell_count: number of cells that an isosurface may cross. unbounded_count: number of these cells whose bound was
-     * replaced by a smaller limit, because their nodes are too far apart to resolve the isosurface */
+    /* cell_count: number of cells that an isosurface may cross. unbounded_count: number of these cells in which the
+     * nodes are too far apart to resolve the isosurface; a limit is reported there instead of the larger error bound */
     int64_t cell_count, unbounded_count;
     /* estimated number of pixels that show the isosurfaces, in units of 1/16 of a pixel */
     int64_t area;

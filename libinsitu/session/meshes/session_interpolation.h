@@ -11,17 +11,17 @@
  * faces or edges in one of them */
 enum { INTERPOLATION_SIDES = 3, INTERPOLATION_MOST_SIDES = 12 };
 
-/* All quads among the faces of a cell, all triangles among them, or all edges of the cell. The nodes of a face can be
- * listed in several orders, which begin at each of its corners and follow the face in either direction; those of an
- * edge in two orders. */
+/* A table of all quads among a cell's faces, of all triangles among them, or of all edges of the cell. The nodes of a
+ * face can be listed in several orders: beginning at any of its corners, and in either direction around it. The nodes
+ * of an edge can be listed in two orders. */
 typedef struct session_interpolation_sides {
     int corner_count; /* number of corners: 4 for a quad, 3 for a triangle, 2 for an edge */
-    int count;        /* number of these faces or edges of the cell */
+    int count;        /* number of faces or edges in the table */
     int turn_count;   /* number of orders in which the nodes of a face or edge can be listed */
     /* number of nodes on one such face or edge in the lattice of the complete cell (node_count) and in the finer
      * lattice (fine_count) */
     int node_count, fine_count;
-    /* for each face or edge, the indices of its corners among the cell's corners, in order around it */
+    /* corners of each face or edge, in order around it, as indices among the cell's corners */
     signed char corners[INTERPOLATION_MOST_SIDES][4];
     /* node_count entries for each face or edge and each order of listing: indices of its nodes in the lattice of the
      * complete cell (session_interpolation.complete) */

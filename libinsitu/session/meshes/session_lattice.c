@@ -316,7 +316,8 @@ void session_copy_lattice(session_mesh *mesh)
     }
     compute_packed_strides(vertices, packed);
     out->vertex_numbering = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
-    /* the axis without cells is moved to the end, so that the first four corners of a cell form its quad */
+    /* in a lattice of quads, the axis without cells is moved to the end, so that the first four of a cell's eight
+     * corners are those of the quad */
     const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
         out->corner_offsets[i] = 0;

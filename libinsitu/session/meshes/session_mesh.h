@@ -27,7 +27,7 @@ typedef struct session_field {
     grid_array *component_arrays; /* array of each component; NULL: all components are in `values` */
     int64_t component_stride;     /* distance in bytes between the components of a tuple in `values` */
     base_error problem;           /* error of the last insitu_set_field(), or an error of the values */
-    bool is_problem_of_contents;  /* set if the error is an invalid value found by the check of this step */
+    bool is_problem_of_contents;  /* set if `problem` is an invalid value that the check in this step has found */
     bool has_index;     /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
     bool is_copy_stale; /* set if the values or the index have changed since `copy` was made */
     /* set if statistics of this step need the field; fields shown by images have scalars instead */
@@ -193,7 +193,7 @@ typedef struct session_topology {
     int64_t connectivity_count, face_connectivity_count;
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
-    int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
+    int64_t recognised_count; /* number of the caller's polyhedra that are read as tets, hexes, wedges or pyramids */
     /* Cells of higher order are read as several linear cells, called pieces (session_split.h); the pieces of a cell are
      * consecutive. */
     bool is_split;               /* true: cells are split into pieces; false: the members below are empty */
@@ -215,7 +215,8 @@ typedef struct session_discontinuous {
      * entries is a corner. */
     bool are_corners_entries;
     int64_t corner_count;
-    grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
+    /* connectivity of the mesh with shared vertices, before each corner got a vertex of its own */
+    grid_array shared_connectivity;
     /* connectivity of the discontinuous mesh: for each entry of the connectivity that is read, the index of its corner,
      * which is also the index of the corner's own vertex. If cells are not split, this is a permutation that is its own
      * inverse. */
@@ -376,17 +377,18 @@ typedef struct session_mesh {
      * (outer/session_covers.h). NULL: `ghosts` is read. insitu_report lists it as a copy. */
     unsigned char *covered;
     session_misfit misfit;
-    grid cells;                  /* the cells in the form that all code of the session reads */
-    bool is_given;               /* false after an insitu_set_mesh() that failed; `problem` then holds the error */
-    base_error problem;          /* error of the last insitu_set_mesh(), or an error of the arrays' contents */
-    bool is_problem_of_contents; /* set if the error is one of the arrays' contents, found by the check in this step */
+    grid cells;         /* the cells in the form that all code of the session reads */
+    bool is_given;      /* false after an insitu_set_mesh() that failed; `problem` then holds the error */
+    base_error problem; /* error of the last insitu_set_mesh(), or an error of the arrays' contents */
+    /* set if `problem` is an error of the arrays' contents that the check in this step has found */
+    bool is_problem_of_contents;
     int field_count;
     session_field *fields;
 
     /* cells_stamp: value of session_meshes.stamp at the last change of the cells; coordinates_stamp: its value at the
      * last change of the coordinates */
     int64_t cells_stamp, coordinates_stamp;
-    bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
+    bool is_check_stale;       /* set if cells or coordinates have changed since the mesh was last checked */
     bool is_topology_stale;    /* set if cells have changed since the tree was built */
     bool is_geometry_stale;    /* set if coordinates have changed since the tree was built or refitted */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
@@ -417,8 +419,9 @@ typedef struct session_mesh {
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
     /* number of steps that have used the tree over all drawn cells since it was built; 0: no such tree was built yet */
     int full_tree_steps;
-    /* seconds spent on partial trees since the cells last changed, minus the estimated time that refits of a full tree
-     * would have taken. If they exceed the estimated time of building a full tree, a full tree is built. */
+    /* time in seconds that partial trees have taken since the cells last changed, minus the estimated time in which a
+     * full tree would have been refitted instead. A full tree is built as soon as this difference exceeds the estimated
+     * time of building it. */
     double partial_tree_seconds;
     int scalar_count;
     session_scalar *scalars;
@@ -482,8 +485,8 @@ static inline int64_t session_type_size(insitu_type type)
 /* Returns whether the address and the stride of an array are multiples of its element size. */
 bool session_is_aligned(const insitu_array *array);
 
-/* Returns the caller's array as the grid_array through which meshes are read. If the array contains indices, they are
- * read as counting from 0. */
+/* Converts the caller's description of an array into a grid_array, through which meshes are read. Indices in the array
+ * are read unchanged, as if they counted from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
 /* Returns the vertices' coordinates along an axis. If z is not given, returns an array all of whose elements are 0. */
@@ -671,13 +674,14 @@ const base_error *session_find_pending_error(const session_meshes *meshes);
 void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
-/* Stores an error of a field's values, which lasts for the rest of the step. Copies it to *first unless *first already
- * holds an error. */
+/* Stores an error of a field's values with the field for the rest of the step. Also copies the error to *first unless
+ * *first already holds an error. */
 void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of the mesh. */
+/* Removes a mesh from the first `count` items for the rest of the step, so that this rank acts as if it had no part of
+ * the mesh. */
 void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
-/* Puts the meshes that the step has excluded back into the list. */
+/* Undoes session_exclude_mesh() for all meshes that were excluded in the step. */
 void session_restore_excluded(session_meshes *meshes);
 
 /* Refuses a public call of the library that the caller's fill function makes, because the call would change data that

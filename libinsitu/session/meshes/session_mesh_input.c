@@ -198,7 +198,8 @@ static insitu_status check_mesh_options(const insitu_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
-/* Checks connectivity_row, and that no other array describes the cells if they are given in rows of equal length. */
+/* Checks connectivity_row, the number of connectivity entries per cell. If it is given, no offsets, cell types or
+ * owners of faces may be given, and the rows of all cells must fit into the connectivity. */
 static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = session_count_cell_nodes(mesh);

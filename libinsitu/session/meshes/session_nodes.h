@@ -37,8 +37,8 @@ int session_lagrange_type(int corner_type);
  * same corners. */
 session_nodes session_complete_nodes(int corner_type, int order);
 
-/* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
- * only order of a type that has just one. */
+/* Returns the number of nodes of a cell of this type and order, or 0 if there is no such cell. order: may be 0 for
+ * types that have only one order. */
 int64_t session_node_count(int type, int order);
 
 /* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */

@@ -127,8 +127,8 @@ static void list_pieces(const pattern_list *list)
 
 /* ---- serendipity cells ----------------------------------------------------------------------------------------- */
 
-/* Returns the node in the middle of the edge between corners a and b, in VTK's order, or -1 if there is no such
- * edge. */
+/* Returns the index, in VTK's order of nodes, of the node in the middle of the edge between corners a and b; -1 if
+ * there is no such edge. */
 static int find_midpoint(const session_shape *shape, int a, int b)
 {
     for (int e = 0; e < shape->edge_count; e++)

@@ -18,8 +18,9 @@ typedef struct pattern_polygon {
     int nodes[4]; /* positions of the vertices in the cell's row of nodes */
 } pattern_polygon;
 
-/* How cells of one type and order are split into pieces. For complete cells the pieces are listed here; those of
- * serendipity cells depend on the coordinates of the nodes (session_cut_serendipity()). */
+/* Describes how cells of one type and order are split into pieces. For complete cells it lists the pieces. For
+ * serendipity cells it lists only polygons, because their pieces also depend on the coordinates of the nodes
+ * (session_cut_serendipity()). */
 typedef struct session_pattern {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;

@@ -240,7 +240,7 @@ static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
                         (unsigned char)session_faces_of_node(shape, fine->order, (const int[]){i, j, k});
 }
 
-/* Finds, for each face of a cell, the pieces that have at least three vertices on this face, and thus a face. out: for
+/* Finds, for each face of a cell, the pieces that have a face on it, that is, at least three vertices on it. out: for
  * each face, kind->word_count words with one bit per piece. */
 static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *faces_of_nodes, uint64_t *out)
 {

@@ -9,7 +9,8 @@
 #include "vector3.h"
 
 typedef struct cell_frame {
-    double mean[3];         /* mean of the vertices, in which each vertex is weighted by the number of its faces */
+    /* mean of the cell's vertices, in which the weight of a vertex is the number of the cell's faces that contain it */
+    double mean[3];
     double least_vertex[3]; /* position of the cell's lexicographically first vertex */
     double box_volume;      /* volume of the bounding box */
 } cell_frame;

@@ -24,7 +24,9 @@ typedef struct session_extent {
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {
-    bool has_extent, has_origin; /* set if the extent or the origin was computed in an earlier step */
+    /* has_extent: set if the member `extent` has been computed; has_origin: set if `origin` and `scale` have been
+     * chosen */
+    bool has_extent, has_origin;
     session_extent extent;
     double lower[3], upper[3]; /* bounds for which the origin and the scale were chosen */
     double origin[3], scale;   /* the renderer's coordinates are (position - origin) * scale */
@@ -34,8 +36,8 @@ typedef struct session_space {
  * trees are dropped. Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
-/* Computes the global bounds, counts and mean size as they would be if no mesh had finer lattices (session_finer.h).
- * Collective. */
+/* Computes the global bounds, numbers of cells and mean size of cells that would result if no mesh had finer lattices
+ * (session_finer.h). Collective. */
 insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
                                         base_error *error);
 

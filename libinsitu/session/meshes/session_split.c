@@ -204,7 +204,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
     }
 }
 
-/* Iterator over those pieces of a complete cell that are made (session_piece_set). */
+/* Iterator over the pieces of a complete cell that are made, which are the pieces in a session_piece_set. */
 typedef struct piece_walk {
     const uint64_t *words; /* NULL: all pieces are made */
     int count;             /* number of pieces of the pattern */

@@ -39,8 +39,9 @@ bool tally_is_flat(const grid *g, int64_t cell);
  * `end`. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
-/* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,
- * without adding anything, if the mesh is not such a lattice or has ghost flags. */
+/* Adds all cells of a uniform or rectilinear lattice to *tally. Bounds, numbers of cells and sizes are computed only
+ * from the coordinates along its axes, without a loop over the cells. Returns false, without adding anything, if the
+ * mesh is not such a lattice or has ghost flags. */
 bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally);
 
 /* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one:

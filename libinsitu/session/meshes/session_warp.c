@@ -51,8 +51,8 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     const bool was_on = mesh->warp.is_applied;
-    /* The check of the mesh has stored this problem as the mesh's error. The check must run again to remove the
-     * error. */
+    /* The check of the mesh has stored this problem as the mesh's error, which is removed only if the check runs
+     * again. */
     if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
