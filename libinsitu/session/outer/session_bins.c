@@ -64,7 +64,8 @@ void session_bins_free(session_bins *bins)
     *bins = (session_bins){0};
 }
 
-/* Sets the iterator to the points of a row of bins along the first axis, which begins at walk->bin. */
+/* Sets the iterator to the points of one row of bins. The row extends along the first axis, and has the indices
+ * walk->bin[1] and walk->bin[2] along the other axes. */
 static void enter_bin_row(session_bin_walk *walk)
 {
     const session_bins *b = walk->bins;

@@ -1,5 +1,6 @@
-/* Sorts points into cubic bins, so that the points near a box are found quickly. If the points lie on a surface, there
- * are about as many bins as points. */
+/* Sorts points into cubic bins, so that the points near a box are found quickly. N points are divided into sqrt(N) / 2
+ * bins, but at least 1 and at most 128, along the longest side of their bounding box. Therefore, below this limit, bins
+ * that intersect a surface of evenly spaced points contain a few points each. */
 #ifndef SESSION_BINS_H
 #define SESSION_BINS_H
 
@@ -13,8 +14,8 @@ typedef struct session_bins {
                                 items[starts[b + 1] - 1] */
 } session_bins;
 
-/* Sorts `count` points into bins. Their positions begin at `positions` and are `stride` bytes apart. Returns false if
- * memory runs out. */
+/* Sorts `count` points into bins. The coordinates x, y, z of the first point are at `positions`; those of consecutive
+ * points are `stride` bytes apart. Returns false if memory runs out. */
 bool session_bins_create(session_bins *bins, const double *positions, int64_t stride, int64_t count);
 void session_bins_free(session_bins *bins);
 

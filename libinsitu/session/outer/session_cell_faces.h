@@ -33,7 +33,8 @@ static inline const session_face_table *session_faces_of_type(int type)
 
 typedef struct session_cell_faces {
     const grid *cells;
-    /* the faces of the cell's type; NULL for polyhedra, and for shells except those of a lattice */
+    /* the faces of the cell's type; NULL for polyhedra, and for shells (cells without volume) except the quads of a
+     * structured grid */
     const session_face_table *table;
     int64_t count;
     /* the cell's vertices, if `table` is given */

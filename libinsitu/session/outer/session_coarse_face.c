@@ -6,12 +6,12 @@
 #include "session_cell_faces.h"
 #include "vector3.h"
 
-/* Coordinates on the face are rounded to the nearest multiple of 1 / PARTS if they differ from it by at most a
- * hundredth of 1 / PARTS. Then hanging vertices at refinements of 2:1, 3:1 and 4:1 have exact positions on the face,
- * even if the vertices' coordinates are rounded. */
+/* The parametric coordinates of a position on a face, from 0 to 1, are rounded to the nearest multiple of 1 / PARTS if
+ * they differ from this multiple by less than a hundredth of 1 / PARTS. Then hanging vertices at refinements of 2:1,
+ * 3:1 and 4:1 have exact positions on the face, even if the vertices' coordinates are rounded. */
 enum { PARTS = 96 };
 
-/* ---- faces ---------------------------------------------------------------------------------------------------- */
+/* ---- reading and measuring faces --------------------------------------------------------------------------------- */
 
 double session_position_rounding(const session_mesh *mesh)
 {
@@ -175,7 +175,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
     return false;
 }
 
-/* ---- positions on faces --------------------------------------------------------------------------------------- */
+/* ---- parametric coordinates and weights of positions on faces ---------------------------------------------------- */
 
 bool session_is_at_corner(const session_coarse_face *face, const double position[3], double slack)
 {
@@ -191,8 +191,8 @@ static double round_coordinate(double at)
     return fabs(at * PARTS - parts) < 0.01 ? parts / PARTS : at;
 }
 
-/* Computes the position on the face at the face coordinates `at` (solve_face_coordinates()), and the derivatives of the
- * position with respect to both coordinates, in `slopes`. */
+/* Computes in `out` the position on the face at the parametric coordinates `at`, which go from 0 to 1 along each edge,
+ * and in slopes[k] the derivative of the position with respect to at[k]. */
 static void evaluate_face(const session_coarse_face *f, const double at[2], double out[3], double slopes[2][3])
 {
     const double bent = f->count == 4;
@@ -206,8 +206,9 @@ static void evaluate_face(const session_coarse_face *f, const double at[2], doub
     }
 }
 
-/* Computes the face coordinates, from 0 to 1 along each edge, of a position by Newton's method, starting from the
- * face's centre. A triangle is treated as half of a parallelogram. */
+/* Computes, by the Gauss-Newton method from the face's centre, the parametric coordinates `at` of the point on the face
+ * (extended beyond its edges) that is nearest to a position. They go from 0 to 1 along each edge. A triangle is treated
+ * as half of a parallelogram. Returns false if the iteration fails. */
 static bool solve_face_coordinates(const session_coarse_face *f, const double position[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];

@@ -14,12 +14,14 @@ typedef struct session_coarse_face {
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
     double area;  /* area of the face */
-    double width; /* length of the longest diagonal or, for a triangle, of the longer of two edges */
+    double width; /* length of the longer diagonal or, for a triangle, of the longer of the two edges at its last
+                   * corner */
 } session_coarse_face;
 
 enum { SESSION_FACE_WORDS = 13 };
 
-/* The data of a triangle or quad that is needed to exclude most positions quickly, before the whole face is read. */
+/* The corners and bounds of a triangle or quad. Most positions can be recognized from these as not lying on the face,
+ * before the face's normal and area are computed (session_coarse_face). */
 typedef struct session_face_outline {
     int count;
     /* count: number of corners, 3 or 4 */

@@ -14,8 +14,8 @@ static bool allocate(int64_t cells, int64_t vertices, session_corner_cells *out)
 }
 
 /* Appends the linear cell that has the corners of one of the caller's cells, with vertices of its own. corners:
- * position of each corner in the cell's row of nodes. type: type of the linear cell. vertex: number of vertices stored
- * so far. Returns the number of vertices afterwards. */
+ * position of each corner in the higher-order cell's list of nodes in the connectivity. type: type of the linear cell.
+ * vertex: number of vertices stored so far. Returns the number of vertices stored afterwards. */
 static int64_t add_cell(const session_mesh *mesh, const session_rows *rows, const int *corners, int64_t cell, int type,
                         int64_t vertex, session_corner_cells *out)
 {

@@ -50,7 +50,7 @@ static void search_free(cover_search *s)
     bins_free(&s->finer_bins);
 }
 
-/* ---- boxes ------------------------------------------------------------------------------------------------------ */
+/* ---- boxes of refined blocks ------------------------------------------------------------------------------------- */
 
 static session_level_box make_level_box(const session_mesh *mesh, int rank)
 {
@@ -59,7 +59,7 @@ static session_level_box make_level_box(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        /* all quads of a plane lattice have the same index along the axis that has no cells */
+        /* a two-dimensional block consists of quads, which have the same index along the axis that has no cells */
         if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
@@ -125,7 +125,7 @@ static bool list_own_boxes(const session_meshes *meshes, cover_search *s)
     return s->boxes != NULL;
 }
 
-/* exchange of boxes -------------------------------------------------------------------------------------------- */
+/* ---- exchange of boxes between ranks ----------------------------------------------------------------------------- */
 
 static bool intersects_box(const session_level_box *box, const session_box *common)
 {
@@ -264,8 +264,8 @@ typedef struct row_walk {
     const session_mesh *mesh;
     const overlap *cells;
     int64_t j, k;
-    int64_t first; /* flat index of the row's first cell in the mesh */
-    bool is_whole; /* true if the fine box covers the row wholly along j and k */
+    int64_t first; /* index of the row's first cell in the mesh's list of cells */
+    bool is_whole; /* true if the fine box covers the cells of the row completely along the axes of j and k */
 } row_walk;
 
 static row_walk walk_rows(const session_mesh *mesh, const overlap *cells)
@@ -310,7 +310,8 @@ static bool has_cut_cell(const session_mesh *mesh, const overlap *cells, const u
     return false;
 }
 
-/* Iterates over the finer boxes that overlap a block. */
+/* Iterates over the boxes of finer blocks that overlap a block; `fine` is the current box, and `cells` its overlap with
+ * the block. */
 typedef struct finer_walk {
     const cover_search *search;
     session_level_box box; /* box of the block */
@@ -339,8 +340,9 @@ static bool next_finer(finer_walk *w)
     return false;
 }
 
-/* Finds the cells of the block that finer blocks cover. *out receives one byte per cell, or NULL if no cell is covered.
- * *has_cuts receives whether a finer block covers only part of some cell. Returns false if memory runs out. */
+/* Finds the cells of the block that finer blocks cover. *out receives an array with one byte per cell, which contains
+ * the bits IS_HIDDEN and IS_CUT, or NULL if no finer block overlaps the block. *has_cuts receives whether a finer block
+ * covers only part of some cell. Returns false if memory runs out. */
 static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, unsigned char **out, bool *has_cuts)
 {
     *out = NULL;
@@ -354,9 +356,9 @@ static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, 
     return true;
 }
 
-/* Reports a misfit if some cell is covered only in part, because this is an error unless another block covers the whole
- * cell. For example, a block that is two levels finer is allowed to begin within a cell if a block of the level in
- * between covers the cell. Then sets all bytes of `covered` to 0 or 1. */
+/* Describes a finer block in mesh->misfit if it covers some cell only in part. This is an error unless another block
+ * covers the whole cell. For example, a block that is two levels finer is allowed to begin within a cell if a block of
+ * the level in between covers the cell. Then sets all bytes of `covered` to 0 or 1. */
 static void report_partly_covered_cells(const cover_search *s, session_mesh *mesh, unsigned char *covered)
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
@@ -367,8 +369,8 @@ static void report_partly_covered_cells(const cover_search *s, session_mesh *mes
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
 }
 
-/* Marks the caller's ghosts in `covered`, too. If the caller's flags have to be read from a copy, the copy is filled
- * here, because the session fills copies only later. */
+/* Sets the bit IS_HIDDEN in `covered` also for cells that the caller flags as ghosts. If the caller's flags must be
+ * read from a converted copy, the copy is filled here, because the session otherwise fills copies only later. */
 static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
@@ -422,7 +424,7 @@ insitu_status session_update_covered_cells(session_meshes *meshes, const session
     return status;
 }
 
-/* ---- faces between levels --------------------------------------------------------------------------------------- */
+/* ---- faces between levels of refinement -------------------------------------------------------------------------- */
 
 /* Computes the centre of the cell on the other side of a face, under the assumption that this cell has the same size as
  * the face's cell. The result is in units of cells of the coarsest level. */

@@ -1,4 +1,5 @@
-/* Finds the cells of refined blocks that finer blocks of the same mesh cover, on any rank.
+/* Handles meshes with adaptive refinement: finds the cells of coarse blocks that are covered by finer blocks of the
+ * same mesh. The finer blocks may be on other ranks.
  *
  * The covered cells are determined from integers: the index of a block's first cell, the number of its cells along each
  * axis without ghost layers, and its refinement. Finer blocks must begin and end at borders of coarser cells, so that a
@@ -15,9 +16,9 @@
  * the block that has this cell describes the finer block. Collective; all ranks return the same status. */
 insitu_status session_update_covered_cells(session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Removes the outer faces whose other side is in a block of another level, on any rank. The faces of thresholds and of
- * quads are kept. Ghost flags of the caller are not taken into account, so that a face next to a ghost cell of another
- * level is also removed. Local. */
+/* Removes the outer faces on whose other side is a block of another level, on any rank. No faces are removed from outer
+ * surfaces of thresholds, or from two-dimensional blocks, whose cells are quads. Ghost flags of the caller are not
+ * taken into account, so that a face next to a ghost cell of another level is also removed. Local. */
 insitu_status session_drop_faces_between_levels(const session_meshes *meshes, const session_face_part *parts, int count,
                                                 base_error *error);
 

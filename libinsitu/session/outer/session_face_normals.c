@@ -46,7 +46,7 @@ static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t
 static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
 {
     const int count = (int)session_row_size(rows, cell);
-    /* in finer lattices, the nodes of a cell have consecutive vertex indices */
+    /* if cells are refined (session_finer.h), the nodes of a cell have consecutive vertex indices */
     const int64_t guess = vertex - session_find_row_vertex(rows, cell, 0);
     if (guess >= 0 && guess < count && session_find_row_vertex(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)
@@ -54,7 +54,8 @@ static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
     return -1;
 }
 
-/* Computes the derivative of positions along an axis of the reference cell at a node. */
+/* Computes the derivative of the position, at a node of the cell read last, with respect to a coordinate of the
+ * reference cell. */
 static void find_tangent(const session_face_normals *n, int node, int axis, double out[3])
 {
     const session_derivatives *of = n->derivatives;

@@ -18,9 +18,9 @@
  * (session_homes.h). */
 static const double relative_slack = 1e-5;
 
-/* A vertex hangs on a face only if the face's area is larger by this factor than the area of each face that has the
- * vertex as a corner. The smallest ratio that occurs is 2: a face that is divided into two parts has twice the area of
- * each part. */
+/* A vertex hangs on a face only if the face's area is more than this factor times the area of each face that has the
+ * vertex as a corner and the opposite orientation. The smallest ratio that occurs is 2: a face that is divided into two
+ * parts has twice the area of each part. */
 static const double least_ratio = 1.25;
 
 /* Two faces have opposite orientation if the dot product of their normals is below this number. The dot product is -1
@@ -64,7 +64,7 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *face_states; /* for each outer face in this rank's borders (session_border), its face_state */
+    unsigned char *face_states; /* the face_state of each outer face of this rank's parts, part by part */
     /* face_count: number of entries of `faces`; own_count: number of entries at the beginning of `faces` that are this
      * rank's faces; face_capacity: number of entries for which there is memory */
     int64_t face_count, own_count, candidate_count, face_capacity;
@@ -87,9 +87,10 @@ static void search_free(hanging_search *s)
     session_bins_free(&s->bins);
 }
 
-/* ---- borders: outer faces of parts of meshes --------------------------------------------------------------------- */
+/* ---- outer faces of parts of meshes (borders) -------------------------------------------------------------------- */
 
-/* Stores in *out the outer faces, which are taken from `outer`, and the vertices that are marked in is_border. */
+/* Moves the outer faces from `outer` to *out, and stores in *out a list of the vertices that are marked in
+ * is_border. */
 static bool store_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
                          session_border *out)
 {
@@ -112,8 +113,8 @@ bool session_has_twins(const session_mesh_group *mesh_group)
     return mesh_group->count > 1 || (mesh_group->meshes[0]->is_refined && !mesh_group->by_id);
 }
 
-/* Fills the search input of each part of one mesh: stores the mesh, and allocates is_border, one byte per vertex of the
- * part. Returns false if memory runs out. */
+/* Fills the input out[i] of session_find_outer_faces() for each of `count` parts of one mesh: stores the part, and
+ * allocates is_border, one byte per vertex of the part. Returns false if memory runs out. */
 static bool list_part_faces(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
@@ -154,8 +155,8 @@ static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, i
     return status;
 }
 
-/* Allocates the borders of the parts. If the number of parts has not changed, the borders are kept. Returns false if
- * memory runs out. */
+/* Allocates one border (a list of outer faces) for each of `count` parts. If the number of parts has not changed, the
+ * existing borders are kept. Returns false if memory runs out. */
 static bool make_borders(session_hanging *hanging, int count)
 {
     if (hanging->borders && hanging->border_count == count) return true;
@@ -196,7 +197,7 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
     return status;
 }
 
-/* ---- candidates ----------------------------------------------------------------------------------------------- */
+/* ---- candidates: vertices that may hang on a face ---------------------------------------------------------------- */
 
 static bool list_candidates(hanging_search *s)
 {
@@ -232,8 +233,8 @@ static bool bin_candidates(hanging_search *s)
 
 typedef enum face_state {
     FACE_UNREAD,
-    /* the face must be read: a candidate that is not a corner of the face is near it, or the face intersects another
-     * rank's box */
+    /* the face will be read in the current pass of read_faces(), because candidates may touch it or it intersects
+     * another rank's box */
     FACE_NEEDED,
     FACE_READ
 } face_state;
@@ -342,7 +343,8 @@ static bool read_faces(hanging_search *s, bool needs_hit)
     return is_done;
 }
 
-/* Reads this rank's faces of the first pass (read_faces()). Returns false if memory runs out. */
+/* Allocates the states of this rank's faces and makes the first pass of read_faces(): reads faces on which a candidate
+ * may lie, and faces near other ranks. Returns false if memory runs out. */
 static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
@@ -411,7 +413,7 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
     return true;
 }
 
-/* ---- contacts ------------------------------------------------------------------------------------------------- */
+/* ---- faces at the position of each candidate --------------------------------------------------------------------- */
 
 /* Prepends a contact with a face to one of a candidate's linked lists. number: index of the face. weights: weights of
  * the face's corners at the candidate. *head: index of the list's first element. Returns false if memory runs out. */
@@ -504,9 +506,9 @@ static bool find_contacts(hanging_search *s)
 
 /* ---- storing the hanging vertices ----------------------------------------------------------------------------- */
 
-/* Requests the values of received faces on which vertices hang: packs the message indices of these faces, for the
- * ranks that sent them. *firsts receives, for each face, the index of its first value among the values that will be
- * received. */
+/* Requests the values at the corners of received faces on which vertices hang: packs the message indices of these
+ * faces, for the ranks that sent them. (*firsts)[i] receives, for each such face i, the index of its first corner's
+ * value among all values that will be received; -1: no vertex hangs on face i. */
 static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
@@ -544,9 +546,9 @@ static bool store_vertices(const hanging_search *s, const int64_t *firsts, sessi
     return true;
 }
 
-/* Stores the groups of equal vertices whose values other ranks request for their hanging vertices. requests: for each
- * rank, the requested faces, as indices within the message of faces that this rank sent to that rank. mail: all of
- * these messages. sent: the index in s->faces of each face in them. */
+/* Lists the groups of equal vertices whose values this rank will send to other ranks for their hanging vertices.
+ * requests: for each rank, the requested faces, as indices within the message of faces that this rank sent to that
+ * rank. mail: all of these messages. sent: the index in s->faces of each face in them. */
 static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                            const session_mail *requests, session_hanging *out)
 {

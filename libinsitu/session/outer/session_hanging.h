@@ -35,14 +35,14 @@ typedef struct session_hanging_basis {
  * treated so in mesh groups of several meshes, and in meshes with levels of refinement. */
 bool session_has_twins(const session_mesh_group *mesh_group);
 
-/* Computes the mesh group's borders (outer faces of parts, session_catalogue.h), and the twins of its vertices
- * (vertices that coincide up to rounding, session_twins.h), unless they are up to date. `parts` contains this rank's
- * parts. Collective; all ranks return the same status. */
+/* Computes the mesh group's borders (the outer faces of its parts, session_border) and twins (vertices that coincide
+ * except for rounding, session_twins.h), unless both are up to date. `parts` contains this rank's parts of the group's
+ * meshes. Collective; all ranks return the same status. */
 insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                      const session_team *team, base_error *error);
 
-/* Computes the mesh group's hanging vertices, unless they are up to date. Its borders must be up to date. Collective;
- * all ranks return the same status. */
+/* Computes the mesh group's hanging vertices, unless they are up to date. The group's borders must be up to date
+ * (session_update_borders()). Collective; all ranks return the same status. */
 insitu_status session_update_hanging_vertices(const session_hanging_basis *basis, const session_team *team,
                                               base_error *error);
 

@@ -36,7 +36,8 @@ static insitu_status find_faces_of_split_parts(const session_parts *parts, const
     if (!of) session_fail_for_memory(error, parts->count * (int64_t)sizeof *of, "outer faces of cells");
     if (of) count = list_parts(parts, of, error);
     insitu_status status = session_agree(team->comm, error);
-    /* equal corners have the same bits on all ranks, so that boxes need not be extended */
+    /* the coordinates of a corner have the same bits on all ranks that have it, so that the ranks' boxes need not be
+     * extended */
     if (!status)
         status =
             session_homes_find(&homes, (const session_mesh *const *)parts->items, parts->count, false, 0, team, error);

@@ -29,8 +29,8 @@
 #include "session_rims.h"
 #include "session_thresholds.h"
 
-/* Maximum number of tables of sums. If there are more threads, they share tables. A table has one 64-bit word per
- * vertex. */
+/* Maximum number of tables in which threads add up the hashes of the faces at each vertex, by exclusive or. If there
+ * are more threads, several threads share a table. A table has one 64-bit word per vertex. */
 enum { MOST_TABLES = 4 };
 
 /* The data that the search stores for one part of the mesh. */
@@ -39,7 +39,8 @@ typedef struct part_cells {
      * corners of the caller's cells (session_corner_cells.h) */
     const grid *grid;
     session_corner_cells corners;
-    /* for each of the corner cells, its first piece; a final entry marks the end. NULL: the mesh is not split */
+    /* pieces first_pieces[i] to first_pieces[i + 1] - 1 of the mesh belong to the corner cell i; NULL: the mesh is not
+     * split */
     const int64_t *first_pieces;
     session_rims rims; /* the faces on which the pieces' vertices lie, if the mesh is split */
     /* one byte per cell of the mesh, nonzero if the threshold does not select the cell; NULL: there is no
@@ -65,10 +66,11 @@ typedef struct face_search {
     int threads;
     part_cells *cells;                /* the cells of each part, with the search's data about them */
     int64_t cell_count, vertex_count; /* numbers of cells and of vertices of all parts together */
-    uint64_t *hashes;                 /* hash of each vertex's position or global id, part by part */
+    uint64_t *hashes; /* for each vertex of all parts, part by part, the hash of its position or global id */
     /* number of tables in vertex_sums: at most MOST_TABLES, so that several threads may share a table */
     int table_count;
-    uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */
+    uint64_t *
+        vertex_sums; /* table_count tables with one word per vertex: exclusive or of the hashes of the vertex's faces */
     /* array indexed by the lowest bits of a vertex's hash: exclusive or of the sums of all vertices with these bits.
      * Vertices at the same position have equal hashes and are thereby treated as one vertex. */
     uint64_t *hash_sums;
@@ -107,7 +109,7 @@ static int64_t count_part_vertices(const part_cells *p)
     return p->grid->cell_count ? p->grid->vertex_count : 0;
 }
 
-/* ---- keys of faces ------------------------------------------------------------------------------------------- */
+/* ---- keys by which equal faces are recognized -------------------------------------------------------------------- */
 
 /* Returns whether the face's i-th vertex differs from all earlier vertices of the face. A repeated vertex is counted
  * once, so that a quad with two corners at the same position is a triangle. */
@@ -136,7 +138,7 @@ static bool make_key(const part_cells *p, const session_face_loop *loop, session
     return vertices >= 3;
 }
 
-/* ---- this rank's parts --------------------------------------------------------------------------------------- */
+/* ---- possible outer faces of this rank --------------------------------------------------------------------------- */
 
 static bool has_faces(const part_cells *p, int64_t cell)
 {
@@ -280,7 +282,7 @@ static void mark_possible_outer_vertices(const face_search *s)
     }
 }
 
-/* The possible outer faces in some of the cells, with their keys. */
+/* A growing list of faces that may be outer faces, with the key of each face. */
 typedef struct face_list {
     int64_t count, capacity;
     found_face *faces;
@@ -314,7 +316,8 @@ static bool may_be_outer_face(const part_cells *p, const session_face_loop *loop
     return true;
 }
 
-/* Returns whether the cell may have an outer face, according to the flags may_be_outer of its vertices. */
+/* Returns whether the cell may have an outer face: at least three of its vertices have the flag may_be_outer, or its
+ * type has no table of faces. */
 static bool may_have_outer_face(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;
@@ -394,7 +397,8 @@ static bool collect_faces(face_search *s)
     return is_done;
 }
 
-/* Determines the groups of equal keys, and the number of keys in each. Returns false if memory runs out. */
+/* Groups equal keys: (*groups)[i] receives the group of key i, and (*sizes)[g] the number of keys in group g. Returns
+ * false if memory runs out. */
 static bool group_equal_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
 {
     session_key_table table = {0};
@@ -457,8 +461,8 @@ static bool read_corners(const session_mesh *mesh, part_cells *p)
     return session_corner_cells_create(mesh, &p->corners) && session_rims_create(mesh, &p->rims);
 }
 
-/* Numbers the cells and vertices of all parts, and finds the cells that thresholds do not select. Returns false if
- * memory runs out. */
+/* Gives the cells and vertices of all parts consecutive indices, part after part, and finds the cells that thresholds
+ * do not select. Returns false if memory runs out. */
 static bool number_parts(face_search *s)
 {
     s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
@@ -498,8 +502,9 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
 
 enum { KEY_WORDS = 3 };
 
-/* Returns the home rank of a face all of whose vertices lie in other ranks' boxes, or -1 if only this rank can have the
- * face. The home rank is that of the vertex with the least hash, which is the same vertex on all ranks. */
+/* Returns the home rank of a face, which counts how often the face occurs on all ranks; -1 if only this rank can have
+ * it, because some vertex of the face lies in no other rank's box. The home rank is that of the vertex with the least
+ * hash, which is the same vertex on all ranks. */
 static int find_face_home(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
@@ -615,10 +620,10 @@ static insitu_status search_shared_faces(face_search *s, const session_homes *ho
     return status;
 }
 
-/* ---- faces of the mesh --------------------------------------------------------------------------------------- */
+/* ---- storing the outer faces ------------------------------------------------------------------------------------- */
 
-/* Iterator over the faces of the mesh's cells that lie on a found face: the face itself or, if the mesh is split into
- * pieces, the faces of pieces. */
+/* Iterator over the faces of the mesh's cells that lie on an outer face which the search has found: the outer face
+ * itself or, if the mesh is split into linear pieces, the faces of pieces on it. */
 typedef struct face_walk {
     const session_mesh *mesh;
     part_cells *part;
@@ -678,7 +683,8 @@ static void mark_borders(const face_search *s)
     }
 }
 
-/* Appends the faces of the mesh that lie on a found face. Returns false if memory runs out. */
+/* Appends to the list of outer faces those faces of the mesh's cells that lie on the face `found`. Returns false if
+ * memory runs out. */
 static bool append_faces(const face_search *s, const found_face *found, int64_t *capacity, session_outer *outer)
 {
     face_walk walk = walk_faces(s, found);

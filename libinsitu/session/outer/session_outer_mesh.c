@@ -12,7 +12,7 @@
 #include "session_scalars.h"
 #include "vector3.h"
 
-/* ---- one face ------------------------------------------------------------------------------------------------ */
+/* ---- normal and apex of one face --------------------------------------------------------------------------------- */
 
 /* A face with three or four corners. The order of the corners depends only on their positions: it begins with the
  * lexicographically smallest corner and continues to the smaller one of its neighbours. */
@@ -73,9 +73,9 @@ static double measure_perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Smallest distance, as a fraction of a face's width, at which a point is treated as lying on one side of the face's
- * plane. The centre of a shell lies in its plane except for rounding errors. The errors must not determine the side,
- * because they depend on the vertex at which the shell's list of vertices begins. */
+/* A point is treated as lying on one side of a face's plane only if its distance from the plane exceeds this fraction
+ * of the face's size. The centre of a shell lies in the shell's plane except for rounding errors. These errors must not
+ * determine the side, because they depend on the vertex at which the shell's list of vertices begins. */
 static const double side_slack = 1e-9;
 
 /* Computes the apex of the cell built on a face. The apex lies above the centre of the corners, at half of the mean
@@ -109,7 +109,7 @@ static void find_point_inside_cell(const grid *g, int64_t cell, double out[3])
     for (int axis = 0; axis < 3; axis++) out[axis] = sum[axis] / (double)(count ? count : 1);
 }
 
-/* ---- the mesh ------------------------------------------------------------------------------------------------ */
+/* ---- building the outer mesh ------------------------------------------------------------------------------------- */
 
 /* A face with more than four corners, or a concave quad. It is drawn as triangles (polygon.h). Of equal consecutive
  * corners only one is stored. */
@@ -122,7 +122,7 @@ typedef struct face_polygon {
     double normal[3]; /* normal that points towards the apexes of the cells built on the face */
 } face_polygon;
 
-/* The state while the outer mesh is built. Its arrays have the largest size that the faces may require. */
+/* The state while the outer mesh is built. The arrays have the largest size that the outer faces may require. */
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
@@ -132,9 +132,10 @@ typedef struct outer_work {
     float *heights; /* value of the scalar at each vertex of the outer mesh: 0 on a face, -1 at an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
-    int64_t loop_end;     /* number of entries of out->loops that have been stored */
-    /* Set if cells of higher order are split into pieces. Edges are then drawn along the rims of the caller's faces
-     * (session_rims.h), not around the faces of pieces. */
+    int64_t loop_end; /* index after the last entry of out->loops (vertices along which edges are drawn) that has been
+                       * stored */
+    /* Set if cells of higher order are split into pieces. Edge lines are then drawn along the edges of the caller's
+     * faces, whose nodes are listed in `rims`, and not around the faces of pieces. */
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
@@ -154,7 +155,8 @@ typedef struct outer_work {
     int mapped_face;
     double normal_scale; /* factor by which the normals at the vertices from first_mapped on are multiplied; 0: not
                             computed yet */
-    /* for each face of `parent`, the index of its rim's loop in out->loops; 0: the loop is not stored yet */
+    /* for each face of the cell `parent`, the index in out->loops of the loop of nodes along its edges; 0: not stored
+     * yet */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 
@@ -308,7 +310,8 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Appends the loop around the polygon, and assigns it to the cells from index `first` on. */
+/* Appends the polygon's vertices as a loop along which edges are drawn (render_part.loops), and assigns the loop to the
+ * cells from index `first` on. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -318,7 +321,8 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
     for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->positions[i]);
 }
 
-/* Appends the rim of a face of the caller's cell to the loops. Returns the index of the new loop in out->loops. */
+/* Appends the nodes along the edges of a face of the caller's cell (the face's rim) to out->loops, so that edges are
+ * drawn along them. Returns the index of the new loop in out->loops. */
 static int64_t add_rim(outer_work *w, int64_t cell, int face)
 {
     const session_rim_kind *of = session_rims_of(&w->rims, cell);
@@ -439,8 +443,9 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Adds the space for the rims of the caller's cells that have outer faces to the upper bounds in *most. A rim is stored
- * as a loop. It may also need further vertices, because some of its nodes may lie on no outer face. */
+/* Adds to the upper bounds in *most the space for the rims (nodes along the edges of faces) of the caller's cells that
+ * have outer faces. A rim is stored as a loop. It may also need further vertices, because some of its nodes may lie on
+ * no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;
@@ -536,8 +541,8 @@ static grid describe_grid(const outer_work *w)
     return g;
 }
 
-/* Makes the normals the gradients of the outer mesh's scalar. Returns false if memory runs out, or if there are too
- * many vertices for 32-bit indices of gradients. */
+/* Stores the normals as the gradients of the outer mesh's scalar, from which the renderer computes normals. Returns
+ * false if memory runs out, or if there are too many vertices for 32-bit indices of gradients. */
 static bool finish_normals(outer_work *w, session_scalar *scalar)
 {
     if (!w->normals) return true;

@@ -64,7 +64,7 @@ static insitu_status fail_range_at_face(const patch_faces *p, int patch, int64_t
     return fail_at_face(p, patch, face, words, error);
 }
 
-/* ---- faces of all patches ---------------------------------------------------------------------------------------- */
+/* ---- vertex groups of the faces of all patches ------------------------------------------------------------------- */
 
 /* Reads a face's vertices from the patch's own list. */
 static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
@@ -146,7 +146,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
     return INSITU_OK;
 }
 
-/* cells of the faces, by owner and neighbour ------------------------------------------------------------------- */
+/* ---- cells that have the faces, from the owners and neighbours of faces ------------------------------------------ */
 
 /* Checks that a face is on the boundary and is given only once, and sets p->is_drawn[f]. i: index of the face in the
  * patch; f: its index among the faces of all patches. is_taken: one bit per face of the mesh, set for the faces that
@@ -189,16 +189,17 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
     return error->status;
 }
 
-/* cells of the faces, if the mesh has no owners: a search of all cells --------------------------------------------- */
+/* ---- cells that have the faces, from a search of all cells if the mesh has no face owners ------------------------ */
 
 typedef struct cell_search {
-    session_key_table keys; /* keys of the faces all of whose vertices have groups */
+    session_key_table keys; /* keys of those faces of the patches all of whose vertices belong to drawn cells */
     int64_t *key_of_face;   /* for each face, the index of its key in `keys`; -1: the face has no key */
     /* for each key: number of the patches' faces with this key (given_counts), and number of cells that have a face
      * with this key (cell_counts) */
     int64_t *given_counts, *cell_counts;
     unsigned char *is_drawn; /* for each key, set if one of its cells is drawn */
-    unsigned char *has_face; /* for each group of vertices, set if a face with a key contains it */
+    unsigned char *
+        has_face; /* for each group of equal vertices, set if a face whose key is in `keys` has a vertex of the group */
 } cell_search;
 
 static void search_free(cell_search *s)

@@ -9,8 +9,8 @@
 /* The groups of equal vertices on this rank. Two faces are treated as equal if their vertices belong to the same
  * groups. */
 typedef struct session_vertex_numbers {
-    /* keys of the vertices of drawn cells; the index of a key in this table is the index of the group of all vertices
-     * with this key */
+    /* hash table of the keys of the vertices of drawn cells; vertices with equal keys form a group, whose index is the
+     * index of the key in this table */
     const session_key_table *keys;
     const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
     /* set if keys are global vertex ids, and not coordinates */

@@ -9,7 +9,7 @@
 
 enum { RIMS_MOST_FACES = SHAPE_MOST_FACES, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
 
-/* The faces of cells of one type and order. Nodes are given by their positions in the cell's row of the
+/* The faces and rims of cells of one type and order. A node is given by its position in the cell's list of nodes in the
  * connectivity. */
 typedef struct session_rim_kind {
     int counts[RIMS_MOST_FACES]; /* number of nodes of each face's rim; 0: the cell does not have this face */
@@ -41,8 +41,8 @@ unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *ver
  * none. */
 int session_find_face_of_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 
-/* Computes the normal, of any length, of a face's plane in the reference cell. It is (0, 0, z) for triangles and
- * quads. */
+/* Computes the normal, of any length, of the plane in which a face of the reference cell lies. The normal is (0, 0, z)
+ * if the cell is a triangle or quad. */
 void session_find_rim_plane(const session_nodes *of, int face, double out[3]);
 
 /* Returns the faces and rims of cells with the type and order of the given cell of the caller. */

@@ -67,8 +67,8 @@ void session_drop_thresholds(session_mesh *mesh)
     mesh->outer_count = kept;
 }
 
-/* Returns the scalar to which the threshold is applied. Returns NULL if there is no threshold, or if the mesh does not
- * have the field. */
+/* Returns the scalar (field component) whose values the threshold compares with its bounds. Returns NULL if there is no
+ * threshold, or if the mesh does not have the field. */
 static const session_scalar *find_scalar(const session_mesh *mesh, const session_threshold *threshold)
 {
     for (int i = 0; i < mesh->scalar_count && threshold->is_given && threshold->field >= 0; i++) {

@@ -16,7 +16,7 @@ enum { CORNER_WORDS = 4 };
 /* A vertex of an outer face. */
 typedef struct face_corner {
     double position[3];
-    double slack; /* vertices within this distance are treated as equal to the corner */
+    double slack; /* vertices of outer faces within this distance of the corner are treated as equal to it */
 } face_corner;
 
 /* A vertex of a face that belongs to only one cell on this rank, and the lexicographically smallest position of all
@@ -37,9 +37,10 @@ typedef struct twin_search {
     session_bins bins;
 } twin_search;
 
-/* ---- corners -------------------------------------------------------------------------------------------------- */
+/* ---- corners of this rank's outer faces -------------------------------------------------------------------------- */
 
-/* Updates, at each vertex of the face, the length of the shortest edge at the vertex. */
+/* Sets edges[v], for each vertex v of the face, to the minimum of its previous value and the lengths of the face's two
+ * edges at v. Edges of length 0 are ignored. */
 static void measure_edges(const grid *g, const session_face *face, double *edges)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
@@ -94,7 +95,7 @@ static bool list_own_corners(twin_search *s)
     return session_bins_create(&s->bins, s->vertices->position, (int64_t)sizeof *s->vertices, s->vertex_count);
 }
 
-/* ---- corners of several ranks --------------------------------------------------------------------------------- */
+/* ---- exchange of corners with other ranks ------------------------------------------------------------------------ */
 
 /* Packs, for each other rank near this one, the corners of this rank that lie in the other rank's box. If mail->words
  * is NULL, the words are only counted. */
@@ -134,7 +135,7 @@ static bool receive_corners(twin_search *s, const session_mail *in)
     return true;
 }
 
-/* ---- least positions of twins ------------------------------------------------------------------------------------ */
+/* ---- common positions of twins (vertices that coincide except for rounding) -------------------------------------- */
 
 /* Finds, for each vertex of this rank, the lexicographically smallest position of the corners that are equal to it. */
 static void find_least_corners(twin_search *s)

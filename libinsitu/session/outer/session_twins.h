@@ -2,8 +2,9 @@
  *
  * Codes compute the vertex positions of each block or level from its own origin and spacing, so that the positions of a
  * vertex in two meshes differ in the last bits. All twins on outer faces are given the lexicographically least of their
- * positions. Two vertices are twins if their distance is at most 1e-5 of the shortest edge of outer faces at one of
- * them. If the rounding errors of coordinates are larger, they replace this limit, up to a quarter of the edge. */
+ * positions. Two vertices are twins if their distance is at most 1e-5 of the length of the shortest edge of outer faces
+ * at one of the two. If the bound of the coordinates' rounding errors is larger than this distance, it is the limit
+ * instead, but at most a quarter of the edge's length. */
 #ifndef SESSION_TWINS_H
 #define SESSION_TWINS_H
 
