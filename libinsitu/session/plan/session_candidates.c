@@ -17,8 +17,8 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
 
 /* ---- visible values -------------------------------------------------------------------------------------------- */
 
-/* Returns whether the interval was added to the scalar before. This happens if a scene sweeps over fields, because the
- * images of the sweep share their isosurfaces. */
+/* Returns whether the scalar's list of visible intervals already contains the interval. This happens if a scene sweeps
+ * over fields, because the images of the sweep share their isosurfaces. */
 static bool scalar_has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
@@ -40,7 +40,8 @@ static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, in
 
 static bool add_isovalue_intervals(session_scalar *scalar, const scene_isosurface *layer)
 {
-    /* Central differences also sample neighbours of crossed cells, so all cells are kept. */
+    /* Normals by central differences also need values in neighbours of the cells that the isosurface crosses, so all
+     * cells are kept as candidates. */
     if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all_cells = true;
     bool is_added = true;
     for (int i = 0; i < layer->value_count && is_added; i++) {
@@ -67,8 +68,9 @@ static bool mark_data_of_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_visible_intervals(scalar, layer);
 }
 
-/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn.
- * This distance is about 0 (session_choose_slice_isovalue()). */
+/* A slice is drawn as an isosurface of the vertices' distances from a plane, with an isovalue near 0
+ * (session_choose_slice_isovalue()). Marks the scalar of these distances as used, and adds an interval that contains
+ * the isovalue. */
 static bool mark_distance_from_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

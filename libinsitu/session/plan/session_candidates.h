@@ -16,8 +16,8 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
 /* Returns whether the candidates can be selected by the cells' values. If so, *key becomes a hash of the scalars and of
  * the intervals of their visible values. Otherwise any cell may be visible. Local. */
 bool session_hash_candidate_queries(const session_mesh *mesh, uint64_t *key);
-/* Selects the candidates, and counts for each scalar the cells that have a value which is not finite. Parallel.
- * Local. */
+/* Selects the candidates among the mesh's cells. Also counts, for each scalar that images show, the cells with values
+ * that are not finite (session_scalar.unusable_count). Parallel. Local. */
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);
 
 #endif

@@ -34,15 +34,16 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    /* first one number per recentring of an input, as working memory of session_recentre(); then one number per mesh of
-     * the catalogue, which is nonzero if the derived values on the mesh are out of date on some rank */
+    /* working memory, used twice: by session_recentre(), with one number per recentring of an input, and afterwards
+     * with one number per mesh of the catalogue, which is nonzero if the derived values on the mesh are out of date on
+     * some rank */
     int *stale;
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
 
-/* Returns the catalogue's entry for the derived field on the mesh; NULL if the field does not exist there or has a
- * fault. */
+/* Returns the catalogue's entry for the derived field on the mesh; NULL if the mesh does not have the field, or if the
+ * field cannot be computed there because of an error (fault). */
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
@@ -78,7 +79,8 @@ static bool next_visited_part(const derive_work *w, part_visit *v)
     return false;
 }
 
-/* Returns the component of an input that the derived field uses, as a value of grid_field.component. */
+/* Returns the component of an input that the derived field uses: its index, or -1 for the magnitude
+ * (grid_field.component). */
 static int find_input_component(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
@@ -151,7 +153,7 @@ static bool list_recentrings(derive_work *w)
     return w->stale != NULL;
 }
 
-/* ---- stale values ----------------------------------------------------------------------------------------------- */
+/* ---- derived values that are out of date ------------------------------------------------------------------------- */
 
 static session_scalar *find_recentred(const derive_work *w, const session_catalogue_mesh *mesh,
                                       const session_mesh *part, int input, int component)
@@ -200,10 +202,11 @@ static insitu_status find_stale_meshes(derive_work *w, base_error *error)
     return status || !w->stale[count] ? status : session_agree(comm, error);
 }
 
-/* ---- values of one mesh ------------------------------------------------------------------------------------------ */
+/* ---- input values and derived values on one part of a mesh ------------------------------------------------------- */
 
-/* Returns a component of an input (grid_field.component) with the centring of the derived field: the values recentred
- * to vertices if the input has cell values but the derived field does not, and otherwise the input's own values. */
+/* Returns the values of a component of an input, at vertices or in cells as the derived field requires. If the input
+ * has cell values but the derived field has vertex values, these are the input's values averaged to vertices; otherwise
+ * they are the input's own values. component: index, or -1 for the magnitude. */
 static grid_field find_input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                     int input, int component)
 {
@@ -281,7 +284,7 @@ static void load_block(const grid_field *field, int64_t first, int count, double
         for (int i = 0; i < count; i++) out[i] = (double)*(const float *)(const void *)(data + i * stride);
 }
 
-/* A thread's buffers for evaluating an expression on one block of points. */
+/* A thread's buffers for evaluating an expression on one block of SCENE_BLOCK consecutive vertices or cells. */
 typedef struct block_buffer {
     const double **inputs; /* for each input, pointer to its values on the block, within `values` */
     /* memory for the values of the inputs on the block, followed by the stack of the expression's program */
@@ -366,7 +369,7 @@ static void compute_expressions(const derive_work *w, base_error *error)
     }
 }
 
-/* ---- gradients --------------------------------------------------------------------------------------------------- */
+/* ---- quantities computed from gradients -------------------------------------------------------------------------- */
 
 static int select_component(int component, const double vector[3], double *out)
 {
@@ -379,7 +382,8 @@ static int select_component(int component, const double vector[3], double *out)
     return component == SCENE_COMPONENT_DEFAULT ? SPACE : 1;
 }
 
-/* Computes the derived values at a vertex from the gradients of the components there. */
+/* Computes the derived values at a vertex. gradient[c]: gradient, at this vertex, of the scalar c in the list of
+ * list_scalars(). */
 static void compute_values_from_gradient(const scene_derived *derived, const double gradient[SPACE][SPACE],
                                          double out[SPACE])
 {
@@ -418,8 +422,8 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
     }
 }
 
-/* Lists the scalars whose gradients are computed, and returns their number. They are the components of a vector, 2 or
- * 3, or the scalar inputs of the derived field. */
+/* Lists the scalars whose gradients the derived field needs, and returns their number. The scalars are the 2 or 3
+ * components of a vector field, or the inputs of the derived field if these are scalars. */
 static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                         grid_field out[SESSION_GRADIENTS])
 {
@@ -434,8 +438,8 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     return count;
 }
 
-/* Returns the first mesh of the group on which the field has no fault. A vector has the same number of components on
- * all meshes without a fault. */
+/* Returns the first mesh of the group on which the derived field can be computed. A vector has the same number of
+ * components on all such meshes. */
 static const session_catalogue_mesh *find_first_mesh_without_fault(const derive_work *w,
                                                                    const session_mesh_group *mesh_group)
 {
@@ -514,7 +518,7 @@ static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
     return status;
 }
 
-/* ---- one derived field ------------------------------------------------------------------------------------------- */
+/* ---- computing one derived field --------------------------------------------------------------------------------- */
 
 static insitu_status derive_field(derive_work *w, base_error *error)
 {

@@ -1,4 +1,5 @@
-/* Computes the values of derived fields. */
+/* Computes the values of derived fields: expressions, gradients and similar quantities that the scene defines from
+ * other fields. */
 #ifndef SESSION_DERIVE_H
 #define SESSION_DERIVE_H
 

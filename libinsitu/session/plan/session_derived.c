@@ -11,7 +11,7 @@ bool session_uses_gradient_of_vector_field(const scene_derived *derived)
     return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
 }
 
-/* ---- needed fields -------------------------------------------------------------------------------------------- */
+/* ---- sets of derived fields that are needed ---------------------------------------------------------------------- */
 
 static uint64_t find_derived_field_bit(const scene *scene, const scene_field *field)
 {
@@ -74,7 +74,7 @@ void session_mark_source_fields(const scene *scene, uint64_t needed, const sessi
     }
 }
 
-/* ---- faults of a derived field on a mesh ---------------------------------------------------------------------- */
+/* ---- errors in the inputs of a derived field on a mesh ----------------------------------------------------------- */
 
 /* A derived field on a mesh, for checks and messages. */
 typedef struct derived_on_mesh {

@@ -22,8 +22,9 @@ insitu_status session_add_derived_fields(const scene *scene, const char *scene_p
 uint64_t session_find_derived_fields_of_plan(const scene *scene, const session_plan *plan);
 uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle, bool images);
 
-/* Marks on this rank's meshes the fields from which the needed derived fields are computed. The marked fields are
- * filled and copied later. needed: one bit per derived field. */
+/* Marks on this rank's meshes the fields from which the needed derived fields are computed (session_field.is_source).
+ * The values of marked fields are later requested from fill functions and copied if necessary. needed: one bit per
+ * derived field. */
 void session_mark_source_fields(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
 /* Returns whether the derived field is computed from the gradients of all components of a single vector field. Returns

@@ -38,7 +38,7 @@ typedef struct planned_layer {
     bool is_unreported;
 } planned_layer;
 
-/* ---- layers ---------------------------------------------------------------------------------------------------- */
+/* ---- list of layers that may be empty ---------------------------------------------------------------------------- */
 
 /* Number of layers that are processed together. Their data is on the stack. */
 enum { BATCH = 128 };
@@ -103,7 +103,7 @@ static const scene_field *find_layer_field(const planned_layer *layer)
     return layer->volume ? &layer->volume->field : &layer->surface->threshold.field;
 }
 
-/* ---- ranges ---------------------------------------------------------------------------------------------------- */
+/* ---- ranges of the values of layers ------------------------------------------------------------------------------ */
 
 static void widen_range(double low, double high, field_range *range)
 {
@@ -111,8 +111,8 @@ static void widen_range(double low, double high, field_range *range)
     range->negated_high = fmin(range->negated_high, -high);
 }
 
-/* Widens the range by the range of values in the root of the mesh's tree. The root's range contains all values of the
- * mesh that images can show. */
+/* Widens *range so that it contains the range of values that is stored in the root of the mesh's tree. The root's range
+ * contains all values of the mesh that images can show. */
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -120,8 +120,8 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by the range of the scalar's values over the set `kind` of the mesh's cells. The latter is computed
- * here unless it is known already. */
+/* Widens *range so that it contains the scalar's values in those cells of the mesh that belong to the set `kind`. The
+ * minimum and maximum of these values are computed here unless they are known already. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -161,10 +161,11 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
 
 /* Further values that are reduced in the same call as the layers' ranges. */
 typedef struct reduced_extras {
-    /* set if, on some rank, other fields than at the last report have cells with values that are not finite
-     * (session_hash_unusable_fields()) */
+    /* set if the set of fields that have cells with values that are not finite differs, on some rank, from that at the
+     * last report (session_hash_unusable_fields()) */
     bool has_other_cells;
-    int reporting_word; /* maximum of all ranks' session_encode_rank_with_warnings() */
+    int reporting_word; /* session_encode_rank_with_warnings() of this rank; after the reduction, the maximum over all
+                           ranks */
 } reduced_extras;
 
 /* Reduces the layers' ranges, earlier errors and *extras over all ranks in one call. of_all_cells: the ranges are
@@ -196,7 +197,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     return status;
 }
 
-/* ---- empty layers ---------------------------------------------------------------------------------------------- */
+/* ---- tests whether layers are empty ------------------------------------------------------------------------------ */
 
 /* Returns the identity of the layer's warning. value: index of the isovalue in the layer; 0 for other layers. In a
  * sweep over isovalues each layer has one isovalue; the warning's number then contains the isovalue's index in the
@@ -225,8 +226,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* Returns the range that is found in the trees, with its minimum raised by the largest rounding error of float32. The
- * true minimum of the values may exceed the trees' minimum by that much. */
+/* Returns a range that was read from trees, with its minimum raised to just below the next larger float32. The true
+ * minimum may be as large as this, because trees store it rounded down to float32. */
 static field_range raise_tree_minimum(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;

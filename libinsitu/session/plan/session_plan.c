@@ -45,7 +45,8 @@ static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZ
     if (size == 0) snprintf(names, NAMES_SIZE, "none");
 }
 
-/* Copies the fault to *error and returns its status. If the fault is NULL, returns INSITU_OK. */
+/* Copies the fault, an error that was found when a mesh or field was checked, to *error and returns its status. Returns
+ * INSITU_OK if there is no fault (NULL). */
 static insitu_status copy_fault(const base_error *fault, base_error *error)
 {
     if (!fault) return INSITU_OK;
@@ -259,7 +260,7 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
     return status;
 }
 
-/* ---- fields to recentre -------------------------------------------------------------------------------------- */
+/* ---- cell fields that must be averaged to vertices --------------------------------------------------------------- */
 
 static bool add_recentrings(const session_catalogue *catalogue, session_plan *plan, const scene_field *field)
 {
@@ -293,7 +294,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
     return is_planned && plan->stale;
 }
 
-/* ---- all images ---------------------------------------------------------------------------------------------- */
+/* ---- images that are due ----------------------------------------------------------------------------------------- */
 
 /* Returns how many multiples of `interval` are not larger than `time`. A multiple that exceeds `time` only by rounding
  * is counted too, because ten steps of 0.1 add up to slightly less than 1. */

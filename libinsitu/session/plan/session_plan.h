@@ -27,7 +27,8 @@ typedef struct session_plan {
     int slice_count, surface_count;
     int recentring_count;
     session_recentring *recentrings;
-    /* working memory of session_recentre(): for each recentring, nonzero if its values are out of date on some rank */
+    /* working memory of session_recentre(): for each element of `recentrings`, nonzero if its averaged values are out
+     * of date on some rank */
     int *stale;
     int64_t cell_count; /* number of drawn cells over all ranks */
     base_error refusal; /* error of the first due image that cannot be drawn */

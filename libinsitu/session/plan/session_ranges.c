@@ -76,7 +76,7 @@ static int compute_digit_shift(int pass)
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* Returns a mask in which those bits of a value are set that earlier passes have determined. */
+/* Returns a mask of the leading bits of a value that the passes before this one have determined. */
 static uint64_t known_bits_mask(int pass)
 {
     return pass ? ~UINT64_C(0) << compute_digit_shift(pass - 1) : 0;
@@ -247,7 +247,8 @@ static void find_own_kinds_of_cells(const counted_cells *cells, int threads, con
     }
 }
 
-/* Computes the values of the caller's cells of meshes with cells of higher order. The nodes of quads are assumed to be
+/* Computes of->order_values: for each mesh with cells of higher order, the minimum and maximum of the values at the
+ * nodes of each of the caller's cells, and the cells' volumes or areas. The nodes of quads are assumed to be
  * equispaced, because areas hardly depend on the spacing. Returns false if memory runs out. */
 static bool find_order_values(const session_meshes *meshes, int threads, const scene_field *field, digit_count *of,
                               base_error *error)
@@ -302,8 +303,9 @@ static int find_digit_at_position(const int64_t counts[DIGITS], int64_t *rank)
     return digit;
 }
 
-/* Returns the position of a percentile among the sorted values, in units of weight. The position is limited to total -
- * 1, because the total may be too large for an exact conversion to double. */
+/* Returns the position of a percentile in the sorted list of values, in which each value takes as many positions as its
+ * weight. total: number of all positions. The result is limited to total - 1, because the total may be too large for an
+ * exact conversion to double. */
 static int64_t find_position_of_percentile(double percent, int64_t total)
 {
     const int64_t rank = (int64_t)fmax(ceil(percent / 100 * (double)total), 1) - 1;
@@ -332,7 +334,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
     return status;
 }
 
-/* ---- all sources of ranges ------------------------------------------------------------------------------------- */
+/* ---- range that a colour map requires ---------------------------------------------------------------------------- */
 
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error)

@@ -64,7 +64,7 @@ typedef struct recentring {
     value_groups values; /* the values to be averaged, sorted by the groups of mesh_group->groups */
 } recentring;
 
-/* ---- values by group ----------------------------------------------------------------------------------------- */
+/* ---- means of groups of equal vertices --------------------------------------------------------------------------- */
 
 /* Initializes groups that have no values yet. The caller keeps ownership of the array `starts`. */
 static bool create_value_groups(value_groups *groups, int64_t count, const int64_t *starts)
@@ -90,10 +90,11 @@ static void groups_free(value_groups *groups)
 
 /* Returns the sum of finite values, each multiplied by scale. largest: the largest absolute value. The bits of the sum
  * do not depend on the order of the values. Each value is split into a multiple of a unit and a remainder. The unit is
- * so coarse that sums of its multiples are exact. The remainder is exact too; it is rounded to a multiple of a finer
- * unit, so that the sum of the remainders is also exact (Rump, Ogita and Oishi, Accurate floating-point summation,
- * 2008, section 3). For 100 values, the part that is neglected is below 2^-85 of the largest value. Therefore the sum
- * is rounded correctly, unless the exact sum is as close as this to the middle between two doubles. */
+ * so coarse, compared with the largest value, that sums of its multiples are exact in double. The remainder is exact
+ * too; it is rounded to a multiple of a finer unit, so that the sum of the remainders is also exact (Rump, Ogita and
+ * Oishi, Accurate floating-point summation, 2008, section 3). For 100 values, the part that is neglected is below 2^-85
+ * of the largest value. Therefore the sum is rounded correctly, unless the exact sum is as close as this to the middle
+ * between two doubles. */
 static double sum_values(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -136,7 +137,7 @@ static void compute_group_means(value_groups *groups, int threads)
     }
 }
 
-/* ---- this rank's values ---------------------------------------------------------------------------------------- */
+/* ---- values of this rank's cells and boundary faces -------------------------------------------------------------- */
 
 /* The groups of a cell's vertices, without duplicates. If values at vertices of split cells are averaged, the list
  * contains the vertices instead of their groups. */
@@ -194,8 +195,8 @@ static inline void add_value(value_groups *values, int64_t group, double value, 
     values->values[at] = value;
 }
 
-/* Adds a cell's values to the groups of its vertices. A cell value is added once per group. Each finite value at a
- * corner is added to the corner's group. */
+/* Adds a cell's values to the groups to which its vertices belong. A value of the whole cell is added once to each
+ * group. If the field has values at corners, each finite one is added to the group of its corner. */
 static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
@@ -282,7 +283,8 @@ static bool add_part_values(recentring *r, int part, int threads)
     return !is_lost;
 }
 
-/* Adds the values of boundary faces to their groups. These groups are marked, so that they get no values of cells. */
+/* Adds the values of boundary faces to the groups of the faces' vertices, and marks these groups, so that no values of
+ * cells are added to them. */
 static void add_boundary_face_values(const session_patch_values *faces, value_groups *values)
 {
     for (int64_t i = 0; i < faces->count; i++) {
@@ -369,10 +371,11 @@ static void average_own_values(recentring *r, const session_team *team, base_err
     base_free(faces);
 }
 
-/* ---- groups that several ranks have ---------------------------------------------------------------------------- */
+/* ---- sending groups that several ranks have ---------------------------------------------------------------------- */
 
-/* number of words in a record before its values: three for the key, and one for the number of values, in which the bit
- * FACE_VALUES is set if the values are those of boundary faces */
+/* number of 64-bit words in a record, the message about one group of equal vertices, before its values: three for the
+ * key, and one for the number of values, in which the bit FACE_VALUES is set if the values are those of boundary
+ * faces */
 enum { RECORD_HEAD = 4 };
 #define FACE_VALUES (UINT64_C(1) << 63)
 
@@ -381,7 +384,8 @@ static int64_t value_count(const value_groups *values, int64_t group)
     return values->ends[group] - values->starts[group];
 }
 
-/* Packs the shared groups into records, sorted by the rank that is their home. */
+/* Packs the groups that other ranks may have too, one record for each group, sorted by their home ranks, which combine
+ * the values of all ranks. */
 static bool pack_records(const recentring *r, int ranks, session_mail *mail)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
@@ -426,7 +430,8 @@ static bool uses_record_values(const uint64_t *record, const value_groups *value
     return !values->has_face_values[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
-/* Finds the group of each record: records with equal keys get the same index, from 0, in `groups`. */
+/* Assigns each record to a group: groups[i] becomes the index, from 0, of the group of record i; records with equal
+ * keys are in the same group. */
 static bool number_records(const session_mail *in, int64_t *groups, session_key_table *keys, int64_t records)
 {
     const uint64_t *end = in->words + in->total;
@@ -439,7 +444,8 @@ static bool number_records(const session_mail *in, int64_t *groups, session_key_
     return true;
 }
 
-/* Collects the records' values by group. starts: zero-initialized, one entry more than there are groups. */
+/* Collects the values of all records of each group. groups[i]: group of record i; count: number of groups; starts:
+ * receives the index of each group's first value, and must contain count + 1 zeros at the call. */
 static bool gather_values_by_group(const session_mail *in, const int64_t *groups, int64_t count, int64_t *starts,
                                    value_groups *values)
 {
@@ -512,8 +518,9 @@ static insitu_status merge_shared_groups(const session_team *team, recentring *r
 
 /* ---- one recentring -------------------------------------------------------------------------------------------- */
 
-/* Copies the means to the vertices. A corner whose own value is not finite keeps that value, so that its cell is not
- * drawn. For cell values, grid_field.source_cells serves this purpose. */
+/* Copies the means to the vertices. A vertex or corner whose own value is not finite gets NaN instead, so that its
+ * cells are not drawn. For fields with cell values this is not necessary, because grid_field.source_cells excludes the
+ * cells whose own values are not finite. */
 static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];

@@ -10,7 +10,7 @@
 
 enum { MOST_BYTES = 1 << 20 }; /* maximum size of a file of ranges that is read */
 
-/* ---- layers ---------------------------------------------------------------------------------------------------- */
+/* ---- layers whose colour ranges widen over the run --------------------------------------------------------------- */
 
 typedef struct layer_list {
     int count;

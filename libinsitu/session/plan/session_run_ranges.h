@@ -39,7 +39,8 @@ typedef struct session_run_ranges {
     session_image_ranges *items;
 } session_run_ranges;
 
-/* Finds or loads the image's ranges; *out is NULL if no layer of the image has a range over the run. Collective. */
+/* Finds the image's ranges, or reads them from their file at the first call for the image. *out is NULL if no layer of
+ * the image has a range that widens over the run. Collective. */
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error);
 

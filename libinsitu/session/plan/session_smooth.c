@@ -17,8 +17,8 @@ typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
     const scene_field *scene_field; /* the field as described in the first layer that shows it */
-    /* name of the mesh group over which values are recentred (session_find_group_name_of_mesh()); unused if values are
-     * not recentred */
+    /* name of the group of meshes over which cell values are averaged to vertices (session_find_group_name_of_mesh());
+     * 0 if the values are not averaged */
     uint64_t mesh_group_name;
     int component;
     int value_count;
@@ -30,7 +30,7 @@ typedef struct smooth_items {
     smooth_item *items;
 } smooth_items;
 
-/* This rank's data for one field that needs gradients. */
+/* This rank's data while the gradients of one field are computed. */
 typedef struct smooth_work {
     session_scalar **scalars; /* scalar of each part */
     mmbvh_selection *crossed; /* for each part, the cells that the isosurface crosses */
@@ -73,7 +73,8 @@ bool session_has_curved_faces(const session_catalogue *catalogue)
     return false;
 }
 
-/* Adds a mesh on which a layer with smooth normals is drawn. */
+/* Adds the field of a layer with smooth normals to the list of fields that need gradients, if the layer is drawn on the
+ * mesh. */
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
     const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
@@ -127,8 +128,8 @@ bool session_plan_has_smooth_normals(const session_plan *plan, const session_cat
 
 /* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
-/* Marks the vertices of the part's crossed cells by 0, and all other vertices by -1. Returns the number of marked
- * vertices. */
+/* Sets part->key_indices[v] to 0 for each vertex v of the cells in `crossed`, which an isosurface crosses, and to -1
+ * for all other vertices. Returns the number of marked vertices. */
 static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -213,11 +214,12 @@ static void free_work(smooth_work *work)
     session_vertex_sums_free(&work->sums);
 }
 
-/* ---- one item ------------------------------------------------------------------------------------------------ */
+/* ---- gradients of one field -------------------------------------------------------------------------------------- */
 
-/* Gives consecutive indices, from 0, to the vertices of the part whose gradients this rank needs. All other vertices
- * have no sum, or a sum that only other ranks need. key_indices[vertex] becomes the vertex's index or -1, and sum_of[n]
- * becomes the index of the sum of the vertex with index n. Returns the number of indices. */
+/* Gives consecutive indices, from 0, to those vertices of the part whose gradients this rank needs. On entry,
+ * key_indices[vertex] is the index of the vertex's sum of gradients, or -1; sums from own_count on are needed only by
+ * other ranks. On return, key_indices[vertex] is the vertex's new index or -1, and sum_of[n] is the index of the sum of
+ * the vertex with the new index n. Returns the number of indices. */
 static int64_t number_vertices_with_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;

@@ -16,7 +16,7 @@ typedef struct surface_request {
     const scene_threshold *threshold;
 } surface_request;
 
-/* Returns the part's outer faces of the requested surface; NULL if it has none. */
+/* Returns the part's outer surface for the threshold of the request; NULL if the part has none. */
 static session_outer *find_outer_surface_of_part(const session_mesh *part, const surface_request *request)
 {
     return part->is_given ? session_find_outer(part, request->threshold) : NULL;

@@ -93,7 +93,8 @@ bool session_transfer_needs_memory(const scene_colour_map *map, const scene_volu
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
 
-/* Fills a table with the colours of the bands and those outside the range. */
+/* Fills out->table with the colours of a volume: the colour of each band, repeated, or of each entry of the map; and
+ * one entry at an end for each colour outside the range. Widens the range of the transfer function by these entries. */
 static bool expand_table(const scene_colour_map *map, session_transfer *out)
 {
     render_transfer *t = &out->transfer;

@@ -9,8 +9,8 @@ typedef struct session_transfer {
     render_transfer transfer;                         /* the transfer function; it points into this struct */
     double opacity_values[RENDER_MAX_OPACITY_POINTS]; /* value of the field at each point of the opacity curve */
     float opacities[RENDER_MAX_OPACITY_POINTS];       /* opacity at each of these values */
-    /* values at the ends of the colour map. The range of the transfer function is larger if a volume has colours for
-     * values outside of [low, high]. */
+    /* field values at the two ends of the colour map. The range of the transfer function is larger if a volume has
+     * colours for values outside of [low, high]. */
     double low, high;
     bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */
     double constant;
@@ -22,7 +22,8 @@ typedef struct session_transfer {
  * map. Returns false if memory ran out, with nothing to free. Local. */
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
-/* Returns whether the transfer function needs memory, and so may fail; the result is the same on all ranks. */
+/* Returns whether session_make_transfer() allocates memory for this map and volume, so that it may fail. The result is
+ * the same on all ranks. */
 bool session_transfer_needs_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 

@@ -43,7 +43,7 @@ static void update_rate(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* Data that is the same for all updates of trees in a step. */
+/* Input and results that the updates of all trees in a step share. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;
@@ -64,8 +64,8 @@ static session_scalar *find_scalar_with_ranges_in_nodes(const session_mesh *mesh
     return NULL;
 }
 
-/* Returns the scalar whose ranges are stored in the tree's nodes. If there is none yet, chooses the first scalar whose
- * ranges an image needs, and marks it as this scalar. */
+/* Returns the scalar whose ranges are stored in the tree's nodes. If there is no such scalar yet, chooses the first one
+ * whose ranges an image needs, and marks it. */
 static session_scalar *choose_scalar_with_ranges_in_nodes(session_mesh *mesh)
 {
     session_scalar *own = find_scalar_with_ranges_in_nodes(mesh);
@@ -162,7 +162,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
     return INSITU_OK;
 }
 
-/* ---- bounds ---------------------------------------------------------------------------------------------------- */
+/* ---- bounding boxes of nodes ------------------------------------------------------------------------------------- */
 
 static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, base_error *error)
 {
@@ -212,8 +212,9 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return has_tree_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Updates the bounds. While the candidates are the same as in the previous step, only bounds of visible nodes must be
- * valid. If the candidates have changed and vertices no longer move, all bounds are refitted one time. */
+/* Updates the bounds. While the candidates (cells that images can show, according to their values) are the same as in
+ * the previous step, only bounds of visible nodes must be valid. If the candidates have changed and vertices no longer
+ * move, all bounds are refitted one time. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
@@ -227,7 +228,7 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     return status;
 }
 
-/* ---- the tree over all parts ----------------------------------------------------------------------------------- */
+/* ---- parent tree over the trees of all parts --------------------------------------------------------------------- */
 
 static uint64_t hash_parts(const session_meshes *meshes, int *count)
 {
@@ -293,7 +294,7 @@ static double estimate_full_tree_cost(const tree_update *u, const session_mesh *
            (double)mesh->drawn_count;
 }
 
-/* Returns whether there is a full tree built over the current cells. */
+/* Returns whether there is a full tree (over all drawn cells) that was built over the current cells. */
 static bool has_full_tree(const session_mesh *mesh)
 {
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
@@ -321,7 +322,8 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
     return !has_new_values(mesh) && mesh->candidates_key == key;
 }
 
-/* Updates a partial tree. key: the hash that identifies the candidates. */
+/* Updates a tree over the candidates, the cells that images can show. key: hash of the queries that select the
+ * candidates (session_hash_candidate_queries()). */
 static insitu_status update_partial_tree(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;

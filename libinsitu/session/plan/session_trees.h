@@ -1,5 +1,5 @@
-/* Builds and updates the trees over the cells of this rank's meshes, and the ranges of values that the trees
- * contain. */
+/* Builds and updates the trees (bounding volume hierarchies) over the cells of this rank's meshes. Each node of a tree
+ * also has the range of a field's values in its cells. */
 #ifndef SESSION_TREES_H
 #define SESSION_TREES_H
 
@@ -19,7 +19,7 @@ typedef struct session_trees {
     session_rates rates;
     /* tree whose leaves are the trees of this rank's parts; it is empty if there are fewer than two such trees */
     mmbvh parent;
-    uint64_t parent_key;  /* hash that identifies the set of parts over whose trees `parent` was built */
+    uint64_t parent_key;  /* hash of the list of parts over whose trees `parent` was built */
     bool is_parent_stale; /* set if a part's tree has changed since `parent` was built */
 } session_trees;
 

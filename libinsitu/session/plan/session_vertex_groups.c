@@ -7,7 +7,7 @@
 
 typedef session_vertex_groups_basis groups_basis;
 
-/* ---- groups --------------------------------------------------------------------------------------------------- */
+/* ---- groups of equal vertices ------------------------------------------------------------------------------------ */
 
 static session_key make_key_of_point(const double position[3])
 {
@@ -19,10 +19,11 @@ static session_key make_key_of_point(const double position[3])
     return key;
 }
 
-/* Assigns the vertices of a part's drawn cells to groups of equal vertices, and counts the corners in each group in
- * corner_starts. A twin is a vertex that is equal to another vertex except for rounding (session_twins.h). While this
- * function runs, group_of_vertex contains -2 - i for the i-th twin. If vertices are compared by id, one_vertex receives
- * the index of one vertex of each group among the vertices of all parts; otherwise it is NULL. */
+/* Assigns the vertices of a part's drawn cells to groups of equal vertices, and adds to corner_starts[g + 1] the number
+ * of corners of the part's drawn cells that are in group g. A twin is a vertex that is equal to another vertex except
+ * for rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i for the i-th twin. If
+ * vertices are compared by id, one_vertex receives the index of one vertex of each group among the vertices of all
+ * parts; otherwise it is NULL. */
 static void group_vertices_of_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];

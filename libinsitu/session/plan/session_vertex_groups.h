@@ -1,4 +1,4 @@
-/* Computes the groups of equal vertices on this rank.
+/* Finds out which vertices of this rank are equal, and numbers the groups of equal vertices.
  *
  * Vertices with equal keys are treated as one vertex. The keys are global ids if all ranks give ids, else the bits of
  * the coordinates, with -0 replaced by +0. Vertices are also grouped if there is only one rank, because otherwise a

@@ -1,5 +1,6 @@
-/* A rank has all vertices for which it needs sums, but may lack some of the cells around them. For each of these
- * vertices, it therefore requests partial sums from the ranks whose boxes contain the vertex.
+/* For each vertex, the gradients of the cells around it are summed. A rank has all vertices for which it needs sums,
+ * but may lack some of the cells around them. For each of these vertices, it therefore requests partial sums from the
+ * ranks whose boxes contain the vertex.
  *
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own keys
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
@@ -74,8 +75,8 @@ insitu_status session_assign_keys_to_vertices(session_vertex_sums *sums, base_er
 
 /* ---- requests to other ranks ----------------------------------------------------------------------------------- */
 
-/* The messages of an exchange of sums. A request is a key; the answer to it is the sum for this key on the other
- * rank. */
+/* The messages by which ranks exchange sums of gradients. A request is the key of a vertex; the answer is the sum over
+ * the other rank's cells around the vertex with this key. */
 typedef struct sums_messages {
     double (*positions)[3]; /* position of a vertex for each of this rank's own keys */
     session_mail requests, received_requests, answers, received_answers;
@@ -143,8 +144,8 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Enlarges the table of keys by space for `more` keys that other ranks request. These are added after this rank's own
- * keys. */
+/* Enlarges the table of keys so that it has space for `more` keys requested by other ranks, which the caller adds after
+ * this rank's own keys. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
@@ -226,7 +227,7 @@ static insitu_status send_answers(const session_team *team, session_vertex_sums 
     return status;
 }
 
-/* ---- sums ---------------------------------------------------------------------------------------------------- */
+/* ---- computing the sums ------------------------------------------------------------------------------------------ */
 
 /* A Bloom filter of the keys in a table: the hash of each key selects one bit, which is set. A vertex whose bit is not
  * set has no key in the table, so that most vertices need no search there. */
@@ -292,8 +293,8 @@ static session_gradient_basis make_gradient_basis(const session_vertex_sums *sum
                                     .polynomials = part->polynomials};
 }
 
-/* Finds the polynomials of a part whose cells are split into pieces. If a field is recentred from cells, none are
- * needed, because the means at nodes are not values of a polynomial. */
+/* Finds the polynomials of a part whose cells are split into pieces. If a field's values were averaged from cells to
+ * vertices, no polynomials are needed, because the means at nodes are not values of a polynomial. */
 static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *part)
 {
     bool is_polynomial = part->mesh->topology.is_split;

@@ -40,7 +40,8 @@ typedef struct session_vertex_sums {
     int64_t *sums;                  /* the sums, session_count_sum_words() words per key */
 } session_vertex_sums;
 
-/* Makes the keys of all vertices of drawn cells, and stores their indices in key_indices. Local. */
+/* Adds the keys of all vertices of drawn cells to sums->keys, and stores the index of each vertex's key in key_indices
+ * of its part. Local. */
 insitu_status session_assign_keys_to_vertices(session_vertex_sums *sums, base_error *error);
 
 /* Computes the sums for this rank's keys over all ranks. The keys, and key_indices of each part, must be set. A rank
