@@ -21,8 +21,8 @@ int session_compute_share_of_cores(const int32_t *may_run, const int32_t *rank_c
     return share > 1 ? (int)share : 1;
 }
 
-/* Marks the cores that belong to OpenMP's places. If there are places, the set of cores of this thread cannot be used,
- * because OpenMP has already bound it to the first place. */
+/* Sets may_run[k] to 1 for each core k that belongs to an OpenMP place (OMP_PLACES). If there are places, the calling
+ * thread's affinity mask cannot be used instead, because OpenMP has already bound this thread to the first place. */
 static void mark_openmp_cores(int32_t may_run[MOST_CORES])
 {
     for (int place = 0; place < omp_get_num_places(); place++) {
@@ -35,7 +35,8 @@ static void mark_openmp_cores(int32_t may_run[MOST_CORES])
     }
 }
 
-/* Marks the cores on which this rank may run. Returns false if the operating system does not provide them. */
+/* Sets may_run[k] to 1 for each core k on which this rank may run, and to 0 for all other cores. Returns false if the
+ * operating system does not tell which cores these are. */
 static bool find_allowed_cores(int32_t may_run[MOST_CORES])
 {
     cpu_set_t set;

@@ -10,10 +10,10 @@
  * ranks that may run on it. Local. */
 int session_compute_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores);
 
-/* Returns this rank's share of the cores among the ranks of its node. If the operating system does not provide the set
- * of cores, the number of cores that OpenMP finds is divided by the number of ranks; if it is smaller than the node's
- * number of cores, these cores are assumed to belong to this rank alone. Collective over the communicator
- * node. */
+/* Returns this rank's share of the cores among the ranks of its node. If the operating system does not tell on which
+ * cores the rank may run, the number of cores that OpenMP finds is used: it is divided by the number of ranks on the
+ * node or, if OpenMP finds fewer cores than the node has, not divided, because these cores are then assumed to belong
+ * to this rank alone. Collective over the communicator node. */
 int session_count_cores_of_rank(MPI_Comm node);
 
 #endif

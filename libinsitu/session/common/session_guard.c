@@ -1,11 +1,11 @@
 /* Simulations trap floating-point exceptions to find their own errors (gfortran's -ffpe-trap, feenableexcept()), or
  * flush denormal numbers to zero (icc's -ftz, gcc's -ffast-math). A trap would end the run in a box test that
- * intentionally divides by zero, or at the number 1e999 in a scene; flushing would change pictures. Both are settings
- * of a thread. GNU's OpenMP workers inherit them from the thread that first started them. LLVM's workers inherit them
- * from the thread that opens a parallel region, and LLVM's OpenMP restores the settings of all threads at the end of
- * the region. Therefore every call sets the default environment and restores the calling thread's environment
- * afterwards, outside of parallel regions. Workers have the default environment within each region (region.h), and
- * their own between regions. */
+ * intentionally divides by zero, or at the number 1e999 in a scene; flushing would change pictures. Traps and flushing
+ * are settings of each thread. GNU's OpenMP workers inherit these settings from the thread that first started them.
+ * LLVM's workers inherit the settings from the thread that opens a parallel region, and LLVM's OpenMP restores the
+ * settings of all threads at the end of the region. Therefore every call sets the default environment and restores the
+ * calling thread's environment afterwards, outside of parallel regions. Workers have the default environment within
+ * each region (region.h), and their own between regions. */
 #include "session_guard.h"
 
 #include <omp.h>

@@ -16,10 +16,10 @@ void session_guard_begin(session_guard *guard);
 /* Restores the saved settings, including exception flags. */
 void session_guard_end(const session_guard *guard);
 
-/* Between session_guard_suspend() and session_guard_resume(), the calling thread has the caller's own environment.
- * OpenMP starts threads in a parallel region between these calls, so that the new threads inherit this environment, as
- * if the caller had started them. Both functions must be called between session_guard_begin() and
- * session_guard_end(). */
+/* Between session_guard_suspend() and session_guard_resume(), the calling thread has the caller's floating-point
+ * environment. OpenMP starts threads in a parallel region between these calls, so that the new threads inherit the
+ * caller's environment, as if the caller had started them. Both functions must be called between session_guard_begin()
+ * and session_guard_end(). */
 void session_guard_suspend(const session_guard *guard);
 void session_guard_resume(void);
 

@@ -1,4 +1,5 @@
-/* FNV-1a hashes. *hash must be initialized with SESSION_HASH_BEGIN, and is updated with the given bytes. */
+/* Computes FNV-1a hashes. The caller initializes *hash with SESSION_HASH_BEGIN; each call then updates *hash with
+ * further bytes. */
 #ifndef SESSION_HASH_H
 #define SESSION_HASH_H
 

@@ -1,4 +1,4 @@
-/* Keys of vertices, and a hash table of keys. */
+/* Defines keys by which equal vertices are recognized, and a hash table that gives each key an index. */
 #ifndef SESSION_KEYS_H
 #define SESSION_KEYS_H
 

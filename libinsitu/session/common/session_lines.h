@@ -6,8 +6,9 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Encodes whether this rank has warnings as a number. The ranks compute the maximum of these numbers; from the maximum,
- * session_decode_rank_with_warnings() determines the lowest rank that has warnings. Local. */
+/* Returns a number that is 0 if this rank has no warnings, and otherwise the larger the lower the rank is. From the
+ * maximum of these numbers over all ranks, session_decode_rank_with_warnings() determines the lowest rank that has
+ * warnings. Local. */
 int session_encode_rank_with_warnings(const session_report *report, const session_team *team);
 /* Returns the lowest rank that has warnings, from the maximum of session_encode_rank_with_warnings() over all ranks; -1
  * if no rank has warnings. Local. */

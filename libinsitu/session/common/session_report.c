@@ -9,7 +9,7 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* ---- lines of text ------------------------------------------------------------------------------------------- */
+/* ---- texts that consist of lines --------------------------------------------------------------------------------- */
 
 static void clear_text(session_text *text)
 {
@@ -109,7 +109,8 @@ static uint64_t warning_key(const session_warning *w)
     return key;
 }
 
-/* Returns the index of the first key in `reported` that is not less than `key`, or reported_count if all are less. */
+/* Returns the index of the first hash in the sorted array `reported` that is not less than `key`, the hash of a
+ * warning; reported_count if all are less. */
 static int find_reported(const session_report *report, uint64_t key)
 {
     int begin = 0, end = report->reported_count;
@@ -128,7 +129,8 @@ static bool reported_key_is_at(const session_report *report, int at, uint64_t ke
     return at < report->reported_count && report->reported[at] == key;
 }
 
-/* Stores at index `at` that a warning has been reported. If memory runs out, the warning will be reported again. */
+/* Inserts a warning's hash `key` into the sorted array of reported warnings at index `at`. If memory runs out, the hash
+ * is not stored, so that the warning will be reported again. */
 static void add_reported(session_report *report, int at, uint64_t key)
 {
     const int count = report->reported_count;

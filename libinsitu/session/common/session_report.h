@@ -22,7 +22,7 @@ typedef struct session_text {
 
 typedef struct session_report {
     insitu_report public_report; /* the report that the caller reads; its texts are set at the end of a step */
-    /* texts of the members of insitu_report with these names */
+    /* the texts to which the members of public_report with the same names point after session_report_end() */
     session_text copied_why, left_out, warnings, pieces;
     /* warnings that only this rank has found; session_share_warnings() sends those of one rank to all ranks */
     session_text own_warnings;
@@ -79,7 +79,7 @@ typedef enum session_warning_kind {
     WARNING_OUTPUTS,   /* an image has no outputs */
     WARNING_PARAMETER, /* a parameter of the scene is not used */
     WARNING_MESH,      /* no mesh has a name that the scene gives at `meshes` */
-    WARNING_WARP,      /* gradients are those of a warped mesh */
+    WARNING_WARP,      /* gradients are computed from the displaced vertices of a warped mesh */
     WARNING_MIRROR,    /* a mesh lies on both sides of its mirror plane */
     WARNING_WRITER,    /* rank 0 has no thread that writes pictures */
     WARNING_THREADS,   /* the scene or OpenMP requests more threads than can be started */

@@ -9,10 +9,10 @@
 #include "error.h"
 
 typedef struct session_team {
-    MPI_Comm comm;             /* the session's own communicator; its error handler returns errors */
-    MPI_Comm compositing_comm; /* communicator that is used only by compositing */
-    struct comp_claims
-        *claims; /* buffer in which compositing agrees on the owners of blocks (comp.h); owned by the session */
+    MPI_Comm comm;              /* the session's own communicator; its error handler returns errors */
+    MPI_Comm compositing_comm;  /* communicator that is used only by compositing */
+    struct comp_claims *claims; /* buffer in which the ranks agree, during compositing, on the rank that blends each
+                                 * block of pixels (comp.h); owned by the session */
     int rank, ranks;
     int node_ranks; /* number of ranks on this rank's node, including itself */
     int cores;      /* this rank's share of the node's cores (session_cores.h) */

@@ -26,7 +26,8 @@
 
 enum {
     SPARE_THREADS = 4,
-    /* memory left free, because OpenMP ends the process if it cannot allocate memory for a region or a task */
+    /* bytes that the trial reserves and then leaves free, because OpenMP ends the process if it cannot allocate memory
+     * for a parallel region or a task */
     SPARE_BYTES = 4 << 20
 };
 
@@ -88,10 +89,11 @@ bool session_needs_thread_trial(const session_threads *threads, int scene_thread
            !pthread_equal(threads->caller, pthread_self()) || threads->ended_count != atomic_load(&ended_count);
 }
 
-/* ---- trial --------------------------------------------------------------------------------------------------- */
+/* ---- starting threads as a trial --------------------------------------------------------------------------------- */
 
 typedef struct trial {
-    pthread_mutex_t exit_mutex; /* locked while threads must not end */
+    pthread_mutex_t exit_mutex; /* held by the thread that starts the trial; the trial's threads wait for it, and end
+                                 * when it is unlocked */
     pthread_t *threads;
     int count;
     /* memory of SPARE_BYTES that is allocated during the trial, and freed after it for other needs */
@@ -147,7 +149,7 @@ static void start_trial_threads(trial *t, int requested)
     pthread_mutex_lock(&t->exit_mutex);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = find_stack_size_of_environment();
-    /* OpenMP, too, ignores a stack size that the system rejects */
+    /* the returned error is ignored: if the system rejects the stack size, the default size is used, as OpenMP does */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
     /* new threads inherit the blocked signals, so that signals sent to the caller's process never reach them */
@@ -200,9 +202,10 @@ static int choose_threads(const session_threads *threads, int scene_threads, int
     return are_enough ? requested : threads->count;
 }
 
-/* ---- stacks -------------------------------------------------------------------------------------------------- */
+/* ---- stack sizes of threads -------------------------------------------------------------------------------------- */
 
-/* A thread's stack: its size, and the number of bytes left below the current frame. Both are INT64_MAX if unknown. */
+/* A thread's stack: free_bytes is the number of bytes left below the current stack frame, total_bytes is the size of
+ * the stack. Both are INT64_MAX if unknown. */
 typedef struct thread_stack {
     int64_t free_bytes, total_bytes;
 } thread_stack;

@@ -22,12 +22,13 @@ enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 typedef struct session_threads {
     int count; /* number of threads, including the caller's thread; 0: not tried yet */
     pthread_t caller;
-    int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
+    int64_t ended_count; /* number of OpenMP workers of this process that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank must make a new trial: it requests more threads than are available, another thread of the
- * caller calls, or threads have ended. scene_threads is the number set in the scene; if it is 0, the rank requests its
- * share of the cores, or OpenMP's maximum if that is lower. Local. */
+/* Returns whether this rank must make a new trial: the rank requests more threads than are available, insitu_step() is
+ * called by another thread than before, or threads have ended. scene_threads is the number of threads that the scene
+ * sets. If scene_threads is 0, the rank requests its share of the cores (cores) or OpenMP's maximum, whichever is
+ * lower. Local. */
 bool session_needs_thread_trial(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If

@@ -21,7 +21,7 @@ void session_free_channels(session_channels *channels)
     *channels = (session_channels){0};
 }
 
-/* ---- frames -------------------------------------------------------------------------------------------------- */
+/* ---- frames in which all surfaces are opaque --------------------------------------------------------------------- */
 
 static void add_frame_statistics(session_frame *sum, const session_frame *frame)
 {
@@ -65,7 +65,7 @@ static render_job make_opaque_job(const render_job *job, render_surface_layer *s
     return out;
 }
 
-/* ---- numbers ------------------------------------------------------------------------------------------------- */
+/* ---- indices of the layer and of the surface at each pixel ------------------------------------------------------- */
 
 /* Position in the scene of each surface of the job: the index of its layer in the image's list of layers, and the index
  * of the surface within this layer (such as the index of its isovalue). */
@@ -131,7 +131,7 @@ static void fill_channel_items(session_channels *c)
     memcpy(c->items, items, sizeof items);
 }
 
-/* ---- all channels -------------------------------------------------------------------------------------------- */
+/* ---- drawing all channels ---------------------------------------------------------------------------------------- */
 
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,

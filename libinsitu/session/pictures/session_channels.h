@@ -15,7 +15,7 @@ enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
     /* 4 floats per pixel, on rank 0 only. normals: the three components of the normal. values: the surface's value, the
-     * index of its layer, and its index within the layer. The fourth float of each pixel belongs to no channel. */
+     * index of its layer, and its index within the layer. The fourth float of each pixel is not used as a channel. */
     float *normals, *values;
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
@@ -24,7 +24,8 @@ typedef struct session_channels {
 bool session_needs_channels(const scene_image *image);
 
 /* Draws the channels in two frames, in which all surfaces of the job are opaque and sampled at the pixels' centres.
- * *taken receives the cost of both frames. The channels must be freed even after an error. Collective. */
+ * *taken receives the statistics of both frames (numbers of rays, times and sizes of messages). The channels must be
+ * freed even after an error. Collective. */
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,
                                     session_frame *taken, base_error *error);

@@ -44,8 +44,9 @@ typedef struct difference_exchange {
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
 
-/* Layout of the array that is reduced to its maximum over the ranks: the ranges of the surfaces' fields (minima are
- * negated), the number of rounds, and an error flag. */
+/* Layout of the array of doubles whose maximum over the ranks is computed. Entries 2 i and 2 i + 1 are the negated
+ * minimum and the maximum of the field of surface i, SHARED_ROUNDS is the number of rounds, and SHARED_FAILURE is 1 if
+ * the rank has an error. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
 static insitu_status share_ranges(difference_exchange *d, base_error *error)
@@ -99,9 +100,10 @@ static insitu_status share_boxes(difference_exchange *d, base_error *error)
     return status;
 }
 
-/* ---- a round ------------------------------------------------------------------------------------------------- */
+/* ---- one round of requests and answers --------------------------------------------------------------------------- */
 
-/* Packs the requests of the round. Returns false if memory runs out. */
+/* Packs, for each near rank, those hits of the round with sample points that may lie in the rank's box. Returns false
+ * if memory runs out. */
 static bool write_requests(difference_exchange *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
@@ -130,8 +132,8 @@ static bool write_requests(difference_exchange *d, session_mail *out)
     return true;
 }
 
-/* Computes the answers to the requests in *in. Requests are read in place, because the words of a message are aligned
- * for their type. */
+/* Computes the answers to the requests in *in. Requests are read directly from the message, because its words are
+ * sufficiently aligned for the type of a hit. */
 static bool write_answers(const difference_exchange *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / REQUEST_WORDS;

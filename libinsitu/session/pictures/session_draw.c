@@ -32,9 +32,9 @@ typedef struct canvas {
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
     float *depth; /* depth of the first frame, which is kept here while further frames are drawn without depth */
-    /* Used if only pixels at edges are drawn several times. samples: the current frame, of which only the pixels at
-     * edges are drawn; edges: indices of these edge_count pixels in the picture; edge_sums: sums of their colours over
-     * the frames. */
+    /* Used if only pixels at edges, which differ visibly from a neighbour, are drawn several times. samples: the
+     * current frame, of which only the pixels at edges are drawn; edges: indices of these edge_count pixels in the
+     * picture; edge_sums: sums of their colours over the frames. */
     image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
@@ -196,7 +196,7 @@ static void canvas_finish(canvas *c, int frames, const render_space *space, int 
     session_finish_deep(&c->deep, space, threads);
 }
 
-/* ---- frames -------------------------------------------------------------------------------------------------- */
+/* ---- drawing the frames of an image ------------------------------------------------------------------------------ */
 
 static render_job make_job(const session_drawing *d, const scene_image *image, const session_view *view,
                            const session_layers *layers)
@@ -272,7 +272,8 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     return status;
 }
 
-/* Finds the pixels at edges in rank 0's picture, and sends the set to all ranks. The caller must free *pixels. */
+/* Finds the pixels at edges (which differ visibly from a neighbour) in rank 0's picture, and sends the set of these
+ * pixels to all ranks. The caller must free *pixels. */
 static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
 {
     canvas *c = b->canvas;
@@ -288,8 +289,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_check_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws the image's frames. The sample positions in the pixels differ from frame to frame. If only pixels at edges are
- * drawn, job->pixels is the set of these pixels. */
+/* Draws the image's frames for antialiasing; the position in the pixel through which rays pass differs from frame to
+ * frame. If only pixels at edges are drawn, job->pixels is the set of these pixels. */
 static insitu_status draw_frames_of_samples(frames_basis *b, const scene_image *image, render_job *job,
                                             base_error *error)
 {
@@ -354,7 +355,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     return drawn;
 }
 
-/* ---- outputs ------------------------------------------------------------------------------------------------- */
+/* ---- passing pictures to the writer ------------------------------------------------------------------------------ */
 
 static scene_placeholder_values make_placeholder_values(const session_drawing *d, const scene_image *image)
 {
@@ -430,7 +431,7 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
     return is_told_later ? INSITU_OK : session_agree(d->team->comm, error);
 }
 
-/* ---- images -------------------------------------------------------------------------------------------------- */
+/* ---- drawing one or all images ----------------------------------------------------------------------------------- */
 
 /* Finds the areas of the image's picture that insets will cover. Insets are drawn over a montage that contains the
  * picture. If several of the image's files are montages with insets, the areas are those of the first such file.

@@ -29,8 +29,8 @@ typedef struct session_drawing {
     const session_team *team;
     const char *scene_path; /* path of the scene file, for messages */
     int64_t cycle;
-    const session_meshes *meshes; /* the meshes, with their trees up to date */
-    const mmbvh *parent;          /* tree over the trees of the meshes (session_trees.h) */
+    const session_meshes *meshes; /* this rank's meshes; their bounding volume hierarchies are up to date */
+    const mmbvh *parent; /* bounding volume hierarchy whose leaves are the trees of the mesh parts (session_trees.h) */
     const session_space *space;
     session_run_ranges *run_ranges;
     session_report *report;

@@ -5,8 +5,8 @@
  * are traced again with every sample as a separate fragment (render.h), composited into a second picture, and copied
  * into the first. A mesh with a few overlapping cells causes only a few such pixels. Two meshes that fill the same
  * space may cause a thousand fragments in each of a million pixels. Such pixels are drawn in several passes, called
- * turns. Each turn has as many pixels as the busiest rank can store fragments for. If segments of several volumes are
- * drawn, all pixels are drawn in turns, and the first pass is omitted. */
+ * turns. The number of pixels of a turn is estimated so that no rank has more fragments than it may store. If segments
+ * of several volumes are drawn, all pixels are drawn in turns, and the first pass is omitted. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -31,7 +31,8 @@ static void add_to_frame(session_frame *frame, const render_statistics *rendered
     frame->composite_ms += composite_ms;
 }
 
-/* Draws a frame if there is only one rank: it is composited while it is traced (comp_tiles.h). */
+/* Draws a frame if there is only one rank. The fragments of a tile of pixels are composited as soon as the tile's rays
+ * have been traced (comp_tiles.h). */
 static insitu_status draw_alone(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
                                 comp_overlaps *overlaps, base_error *error)
 {
@@ -47,8 +48,9 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
-/* Traces the job's rays in this rank's cells. If normals are computed by differences, the ranks exchange samples, and
- * the status is the same on all ranks. Other errors of this rank are stored in *error and not returned. */
+/* Traces the job's rays in this rank's cells. If normals are computed by central differences, the ranks exchange
+ * samples of the field, and the returned status is the same on all ranks. Other errors of this rank are stored in
+ * *error and not returned. */
 static insitu_status trace_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      render_statistics *rendered, base_error *error)
 {
@@ -107,11 +109,11 @@ static insitu_status draw_frame(const session_frame_target *t, const render_job 
     return status;
 }
 
-/* ---- overlaps ------------------------------------------------------------------------------------------------ */
+/* ---- drawing pixels in which cells overlap ----------------------------------------------------------------------- */
 
-/* Estimates the number of pixels that produce fragment_limit fragments. The number of samples per pixel is estimated
- * from the length of a ray in the scene, which is about 1 and at most sqrt(3) in scaled units. The number of segments
- * per pixel is an empirical value. */
+/* Estimates the number of pixels that produce fragment_limit fragments. The number of samples per pixel is estimated as
+ * 2 divided by the distance between samples, because a ray is about 1, and at most sqrt(3), long within the scene in
+ * scaled units. The number of segments per pixel is an empirical value. */
 static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
@@ -216,7 +218,7 @@ static void remove_samples(const unsigned char *pixels, const image *out)
         if (pixel_set_has(pixels, p)) out->deep->counts[p] = 0;
 }
 
-/* A second picture on rank 0, into which the pixels of a turn are drawn. */
+/* A second picture on rank 0, into which the pixels of a turn (a pass over some of the pixels) are drawn. */
 typedef struct second_picture {
     image picture;
     unsigned char *turn_pixels; /* set of pixels that the turn draws; on every rank */
@@ -319,8 +321,8 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw_frame(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
-        /* because of rounding, a sample at the common face of two cells may be in both; redraw_overlaps() therefore
-         * counts the real overlaps from separate samples */
+        /* the count includes pixels in which, because of rounding, a sample at the common face of two cells is in both
+         * cells; redraw_overlaps() therefore sets frame->overlaps after drawing each sample as a separate fragment */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);

@@ -19,8 +19,8 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* Sizes of messages in 8-byte words. A request consists of a hit and the set of its rays to trace; an answer is a set
- * of rays. */
+/* Sizes of one request and of one answer in 8-byte words. A request consists of a hit and the set of its shadow and
+ * occlusion rays to trace; an answer is the set of those that are not blocked. */
 enum {
     REQUEST_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8,
     ANSWER_WORDS = sizeof(render_hit_rays) / 8
@@ -41,9 +41,9 @@ typedef struct lighting {
     render_hit_rays *rays;
 } lighting;
 
-/* The requests of a round that this rank sends, in the order of the hits that need them. Request i is described by
- * element i of three arrays: ranks has the rank to which it is sent, hits the index of its hit in the round, and rays
- * the set of rays to trace. */
+/* The requests that this rank sends in a round, in the order of the hits for which they are sent. Request i is
+ * described by element i of three arrays: ranks has the rank to which it is sent, hits the index of its hit in the
+ * round, and rays the set of rays to trace. */
 typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
@@ -68,7 +68,7 @@ static insitu_status share_boxes(lighting *l, base_error *error)
                              "MPI_Allgather");
 }
 
-/* ---- requests ---------------------------------------------------------------------------------------------------- */
+/* ---- sending requests -------------------------------------------------------------------------------------------- */
 
 static bool reserve_requests(request_list *q)
 {
@@ -152,7 +152,7 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
     return status;
 }
 
-/* ---- answers ------------------------------------------------------------------------------------------------- */
+/* ---- answering requests ------------------------------------------------------------------------------------------ */
 
 /* Copies the requests into an array of hits and an array of rays, because in the message each hit is followed by its
  * rays. */
@@ -214,10 +214,11 @@ static insitu_status exchange_requests(lighting *l, base_error *error)
     return status;
 }
 
-/* ---- rounds -------------------------------------------------------------------------------------------------- */
+/* ---- lighting in rounds ------------------------------------------------------------------------------------------ */
 
-/* Collects the hits among the fragments from index `first` on, until the round is full. The lighting of hits that need
- * no rays is computed immediately. Returns the index of the fragment at which the next round continues. */
+/* Collects the hits of a round: goes through the fragments from index `first` on until it reaches the end or has found
+ * round_hits fragments that need shadow or occlusion rays. The lighting of fragments that need no such rays is computed
+ * immediately. Returns the index of the fragment at which the next round continues. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};

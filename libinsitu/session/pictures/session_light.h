@@ -1,4 +1,5 @@
-/* Computes shadows and ambient occlusion of a frame's hits, over all ranks. */
+/* Computes shadows and ambient occlusion at a frame's hits (points at which rays meet surfaces), from the surfaces of
+ * all ranks. */
 #ifndef SESSION_LIGHT_H
 #define SESSION_LIGHT_H
 

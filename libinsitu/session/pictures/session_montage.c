@@ -89,7 +89,8 @@ static void free_montage(session_montage *m)
     *m = (session_montage){0};
 }
 
-/* Returns the start of row y of a smaller picture that is stored at this place of the montage. */
+/* Returns the address, within the montage's pixels, of the first pixel of row y of the smaller picture at this
+ * place. */
 static float *find_row(const insitu_place *place, int y)
 {
     return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
@@ -170,7 +171,7 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     return status;
 }
 
-/* ---- shared colour bars ------------------------------------------------------------------------------------------ */
+/* ---- panels that share their colour bars ------------------------------------------------------------------------- */
 
 /* Returns the decorations of the first panel that has a picture, if the bars of all panels are equal; otherwise
  * NULL. */
@@ -233,7 +234,7 @@ static insitu_status finish_panels(const scene_montage *of, session_montage *m, 
     return status || !shared ? status : draw_strip(of, m, shared, error);
 }
 
-/* ---- insets ------------------------------------------------------------------------------------------------------ */
+/* ---- drawing insets ---------------------------------------------------------------------------------------------- */
 
 /* Draws the frame around an inset, in a grey that is visible on dark and light backgrounds. */
 static void draw_frame(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
@@ -276,7 +277,7 @@ static insitu_status finish_montage(const scene_montage *of, session_montage *m,
     return status;
 }
 
-/* ---- files ------------------------------------------------------------------------------------------------------- */
+/* ---- writing montages to files ----------------------------------------------------------------------------------- */
 
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error)
 {

@@ -24,11 +24,12 @@
 
 static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = (int64_t)64 << 20;
 
-/* ---- the process's end ---------------------------------------------------------------------------------------- */
+/* ---- waiting for pictures before the process ends ---------------------------------------------------------------- */
 
 static pthread_mutex_t all_mutex = PTHREAD_MUTEX_INITIALIZER;
 static session_writer *all_writers;
-static pid_t process; /* id of the process that started the thread; a forked process does not have the thread */
+static pid_t process; /* id of the process that started the writing thread; after a fork, the child process does not
+                       * have this thread and must not wait for it */
 
 static void wait_for_thread(session_writer *w)
 {
@@ -85,9 +86,9 @@ static void remove_from_all_writers(session_writer *w)
     pthread_mutex_unlock(&all_mutex);
 }
 
-/* ---- memory of pictures --------------------------------------------------------------------------------------- */
+/* ---- reuse of the memory of pictures ----------------------------------------------------------------------------- */
 
-/* Returns the size in bytes of the unused memory that is kept for future pictures. The mutex must be held. */
+/* Returns the size in bytes of the unused blocks that are kept for future pictures. The caller must hold w->mutex. */
 static int64_t free_bytes(const session_writer *w)
 {
     int64_t bytes = 0;
@@ -95,8 +96,8 @@ static int64_t free_bytes(const session_writer *w)
     return bytes;
 }
 
-/* Keeps the memory for future pictures, or frees it if enough is kept. Memory is kept because allocating new pages
- * takes as long as filling them. The mutex must be held. */
+/* Keeps the block *memory for future pictures, or frees it if enough blocks are kept. Blocks are kept because
+ * allocating new pages takes as long as filling them. The caller must hold w->mutex. */
 static void keep_memory(session_writer *w, session_picture *memory)
 {
     for (int i = 0; i < SESSION_FREE_PICTURES; i++)
@@ -107,8 +108,8 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Takes a kept block of at least `bytes` bytes. If all kept blocks are smaller, *memory stays empty, and one of the
- * kept blocks is freed. The mutex must be held. */
+/* Moves a kept block of at least `bytes` bytes to *memory. If all kept blocks are smaller, *memory stays empty, and one
+ * of the kept blocks is freed. The caller must hold w->mutex. */
 static void reuse_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;
@@ -161,9 +162,10 @@ int64_t session_writer_count_bytes(session_writer *w, int *waiting)
     return bytes;
 }
 
-/* ---- the thread ----------------------------------------------------------------------------------------------- */
+/* ---- the writing thread ------------------------------------------------------------------------------------------ */
 
-/* Appends files to a list. The mutex must be held. */
+/* Appends `files` to the linked list whose first and last element are *first and *last. The caller must hold the
+ * writer's mutex. */
 static void append_files(session_files **first, session_files **last, session_files *files)
 {
     files->next = NULL;
@@ -174,7 +176,7 @@ static void append_files(session_files **first, session_files **last, session_fi
     *last = files;
 }
 
-/* Moves the first element of the queue to the list of written files. The mutex must be held. */
+/* Moves the first element of the queue to the list of written files. The caller must hold w->mutex. */
 static void finish_first_files(session_writer *w)
 {
     session_files *files = w->first;
@@ -239,7 +241,7 @@ double session_writer_begin(session_writer *w, const scene *scene)
     return ms;
 }
 
-/* ---- input and results ---------------------------------------------------------------------------------------- */
+/* ---- queueing pictures and collecting results -------------------------------------------------------------------- */
 
 void session_writer_queue(session_writer *w, session_files *files, base_error *error)
 {

@@ -21,7 +21,8 @@
 
 enum { SESSION_FREE_PICTURES = 4 };
 
-/* The writer's state. The thread accesses it only while it holds the mutex, except for the files that it is writing. */
+/* The writer's state. The thread accesses this state only while it holds the mutex, except for the queue's first
+ * element, whose files it is writing. */
 typedef struct session_writer {
     pthread_mutex_t mutex;
     pthread_cond_t has_changed; /* condition that signals a change of the queue or of is_ending */
@@ -34,7 +35,7 @@ typedef struct session_writer {
     int64_t written_count;                              /* number of pictures written; used by the thread only */
     int queued_count;                                   /* number of pictures in the queue */
     int64_t queued_bytes;                               /* size of all data in the queue */
-    session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks that are kept for future pictures */
+    session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks of memory that are kept for future pictures */
     base_error failure; /* first error that no step has returned yet; used by the caller's thread only */
     int failure_count;  /* number of errors since `failure` was stored, including that one */
     /* time in milliseconds that loading the image library took in insitu_create(), for the next report */
