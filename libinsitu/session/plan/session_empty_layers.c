@@ -199,15 +199,15 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* ---- tests whether layers are empty ------------------------------------------------------------------------------ */
 
-/* Returns the identity of the layer's warning. value: index of the isovalue in the layer; 0 for other layers. In a
- * sweep over isovalues each layer has one isovalue; the warning's number then contains the isovalue's index in the
+/* Returns the identity of the layer's warning. isovalue_index: index of the isovalue in the layer; 0 for other layers.
+ * In a sweep over isovalues each layer has one isovalue; the warning's number then contains the isovalue's index in the
  * scene file's list (list_isosurfaces()). */
-static session_warning make_warning(const planned_layer *layer, int value)
+static session_warning make_warning(const planned_layer *layer, int isovalue_index)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
                                       : layer->volume   ? WARNING_TRANSPARENT
                                                         : WARNING_THRESHOLD;
-    return (session_warning){kind, layer->image->name, NULL, layer->number + value};
+    return (session_warning){kind, layer->image->name, NULL, layer->number + isovalue_index};
 }
 
 /* Returns whether no cell crosses an isovalue. A crossing belongs to the cell whose values reach the isovalue from
@@ -239,11 +239,11 @@ static int count_values(const planned_layer *layer)
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
-/* Returns whether the layer shows no value of the range. For an isosurface, only the isovalue with index `value` is
+/* Returns whether the layer shows no value of the range. For an isosurface, only the isovalue with this index is
  * tested. */
-static bool is_layer_empty(const planned_layer *layer, int value, const field_range *range)
+static bool is_layer_empty(const planned_layer *layer, int isovalue_index, const field_range *range)
 {
-    if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
+    if (layer->isosurface) return is_outside(layer->isosurface->values[isovalue_index], range);
     return layer->volume ? is_transparent(layer->volume, range) : layer->is_empty;
 }
 
@@ -266,10 +266,11 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
 
 /* ---- warnings -------------------------------------------------------------------------------------------------- */
 
-static void warn_of_empty_isosurface(session_report *report, const planned_layer *layer, int value, bool holds)
+static void warn_of_empty_isosurface(session_report *report, const planned_layer *layer, int isovalue_index, bool holds)
 {
-    const session_warning warning = make_warning(layer, value);
-    const double low = layer->range.low, high = -layer->range.negated_high, at = layer->isosurface->values[value];
+    const session_warning warning = make_warning(layer, isovalue_index);
+    const double low = layer->range.low, high = -layer->range.negated_high,
+                 at = layer->isosurface->values[isovalue_index];
     session_warn(report, &warning, holds,
                  "image \"%s\": the isosurface of \"%s\" at %g is empty: the field goes from %g to %g%s",
                  layer->image->name, layer->isosurface->field.name, at, low, high,
