@@ -78,8 +78,9 @@ static void choose_owners(composition *c)
         c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
 }
 
-/* Computes this rank's claim to own each block of pixels: the number of its fragments in the block, and from it the
- * priority (comp_claim_priority()). The rank with the highest priority will own the block. */
+/* Computes this rank's claim to own each block of pixels: the number of fragments that this rank has in the block, and
+ * the priority that follows from this number (comp_claim_priority()). The rank with the highest priority will own the
+ * block. */
 static void claim_blocks(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
@@ -90,8 +91,8 @@ static void claim_blocks(composition *c)
         claims[b].priority = comp_claim_priority(b, c->transport.rank, claims[b].fragments);
 }
 
-/* Allocates the memory for exchanging and merging fragments, finds this rank's fragments of each strip of the picture,
- * and computes this rank's claims to blocks. */
+/* Allocates the memory for exchanging and merging fragments. Also finds this rank's fragments in each strip of the
+ * picture, and computes this rank's claims to own blocks of pixels. */
 static insitu_status allocate_phases(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
@@ -109,8 +110,8 @@ static insitu_status allocate_phases(composition *c, fragment_list *items, base_
     return status;
 }
 
-/* Merges the fragments of the pixels that this rank owns. On rank 0 the finished pixels are stored in the picture, on
- * other ranks in *finished. *held contains the fragments that other ranks have sent. */
+/* Merges the fragments of the pixels that this rank owns, including those in *held, which other ranks have sent. Rank 0
+ * stores the finished pixels in the picture, and other ranks store them in *finished, as messages. */
 static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
                                  insitu_status status, base_error *error)
 {
@@ -153,8 +154,8 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     return status;
 }
 
-/* Checks the picture's size, and initializes the route, the grid and the claims to blocks. On an error the fragments
- * are freed. */
+/* Checks the picture's size, and initializes the route, the grid and the claims to blocks. If the size is invalid, the
+ * fragments are freed. */
 static insitu_status begin_composite(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;
@@ -172,8 +173,8 @@ static insitu_status begin_composite(composition *c, fragment_list *items, int t
     return INSITU_OK;
 }
 
-/* For deep pictures: sends the samples that owners have made to rank 0, or drops them if an error occurred. The lists
- * of samples are freed. */
+/* Sends the samples of a deep picture to rank 0, or drops them if an error occurred. The samples were made by the
+ * owners of the pixels. The lists of samples are freed. */
 static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
@@ -188,8 +189,8 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* Composites the fragments. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and
- * otherwise 0. */
+/* Composites the fragments. *has_overlaps receives the same value on all ranks: nonzero if any rank found a pixel in
+ * which fragments overlap, and otherwise 0. */
 static insitu_status composite_fragments(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;
@@ -226,10 +227,10 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     return status ? status : composite_fragments(&c, items, &none, error);
 }
 
-/* ---- overlaps --------------------------------------------------------------------------------------------------- */
+/* ---- pixels with overlapping fragments -------------------------------------------------------------------------- */
 
-/* Each owner has found the pixels in which fragments overlap among its own pixels. Computes the union of these sets and
- * stores it on all ranks. */
+/* Computes the set of all pixels in which fragments overlap, and stores it on all ranks. Before the call, each rank has
+ * the set of such pixels among those that it owns. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
     const int bytes = (int)pixel_set_bytes(pixel_count(c));

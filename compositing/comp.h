@@ -31,8 +31,10 @@
 typedef struct comp_group {
     MPI_Comm comm; /* communicator that only compositing uses */
     comp_nodes nodes;
-    comp_schedule schedule; /* schedule of messages; COMP_AUTOMATIC chooses the fastest one for each picture */
-    /* largest number of ranks in a dense round (comp_messages.h); 0: the default of comp_route.h */
+    comp_schedule schedule; /* schedule by which messages are sent; COMP_AUTOMATIC chooses the fastest one for each
+                               picture */
+    /* largest number of ranks among which every rank sends a message to every other, even an empty one (a dense round,
+     * comp_messages.h); 0: the default of comp_route.h */
     int max_dense_ranks;
     comp_claims *claims; /* buffer in which ranks agree on the owners of blocks, created by comp_claims_create(); one
                             buffer serves all pictures */
@@ -53,9 +55,10 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
 
 /* Returns whether a pixel's fragments, in the order of comp_merge_pixel(), overlap in front of the first opaque
  * fragment. Two volume fragments overlap if both contain some t. A volume fragment overlaps a surface if it contains
- * the surface's t. It does not overlap the surface if it begins at that t, except for the rounding error of the t at
- * which a ray crosses a face. A fragment whose end precedes its start, because its length is below rounding, overlaps
- * nothing. Single samples (fragment.h) of two volumes, or of two cells at their common face, do not overlap. Local. */
+ * the surface's t and begins before this t. If it begins before this t by no more than the rounding error of the t at
+ * which a ray crosses a face, it does not overlap the surface. A fragment whose end precedes its start, because its
+ * length is below rounding, overlaps nothing. Two samples (volume fragments of length zero) at the same t do not
+ * overlap if they belong to two volumes, or to two cells at the common face of these cells. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 /* Returns whether a pixel's fragments overlap (comp_pixel_overlaps()), for fragments that ranks may have folded. They
@@ -73,8 +76,9 @@ typedef struct comp_statistics {
     bool has_failed; /* true if the error occurred on this rank */
 } comp_statistics;
 
-/* Composites an image. Performs two reductions over group->comm, and a barrier for each sparse round (comp_messages.h).
- * threads is the number of threads of this rank, or 0 for the default of OpenMP. statistics may be NULL. Collective.
+/* Composites an image. Performs two reductions over group->comm, and a barrier for each round in which only ranks with
+ * fragments send messages (a sparse round, comp_messages.h). threads is the number of threads of this rank, or 0 for
+ * the default of OpenMP. statistics may be NULL. Collective.
  *
  * out->width and out->height must be set on all ranks. Rank 0 must allocate out->rgba and may allocate out->depth; both
  * are filled on rank 0 and ignored on other ranks. out->deep must be given on all ranks or on none. On rank 0,
@@ -82,9 +86,9 @@ typedef struct comp_statistics {
  * fragments (comp_deep.h), with t as depth. If out->is_folded, which must be the same on all ranks, pixels are merged
  * by comp_merge_folded_pixel().
  *
- * The fragment list is always emptied and its memory released. An error on one rank (lack of memory) is an error on
- * all ranks. If *error contains an error before the call, because this rank could not make its fragments, this error
- * is also returned on all ranks. */
+ * The fragment list is always emptied and its memory released. An error on one rank (lack of memory) is an error on all
+ * ranks. If *error contains an error before the call, because this rank could not make its fragments, this error is
+ * also returned on all ranks. */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 

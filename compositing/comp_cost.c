@@ -8,9 +8,10 @@ const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11}
  * All pixels of a tile, or of a block if blocks are smaller than tiles, have the same owner. */
 enum { TILE_PIXELS = 256 };
 
-/* Returns the number of partners to which the busiest rank sends messages in a round. In a dense round these are all
- * partners. In a sparse round there are at most as many as tiles (or blocks, if these are smaller) in which the rank
- * has fragments. */
+/* Returns the number of partners to which the busiest rank sends messages in a round. In a dense round, in which empty
+ * messages are sent too, these are all partners. In a sparse round, the rank sends only to owners of the tiles in which
+ * it has fragments (or of the blocks, if these are smaller than tiles), so that the number of these tiles is an upper
+ * bound. */
 static double count_partners(const comp_route *route, int round, const comp_load *load)
 {
     const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;
@@ -30,8 +31,8 @@ comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, con
         cost.messages += partners;
         cost.bytes += share * bytes;
         cost.seconds += latency + 2 * overhead * partners + (is_within ? m->node_gap : m->gap) * share * bytes;
-        /* a sparse round ends with a barrier, which is modelled as log2(ranks) exchanges between pairs of ranks (a
-         * dissemination barrier) */
+        /* a sparse round, in which only ranks with fragments send, ends with a barrier, which is modelled as
+         * log2(ranks) exchanges between pairs of ranks (a dissemination barrier) */
         if (!comp_route_is_dense(route, i)) cost.seconds += ceil(log2(route->ranks)) * (m->latency + 2 * m->overhead);
     }
     if (route->ranks > route->owners) {
@@ -49,7 +50,8 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
         int radix;
     } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
-    /* all ranks are on one node, so that a separate round within the node would leave nothing for further rounds */
+    /* If all ranks are on one node, a round within the node would already bring all fragments to their owners, so that
+     * no schedule needs to distinguish nodes. */
     if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false};
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_estimate_cost(&best, load, machine).seconds;

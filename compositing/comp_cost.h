@@ -1,9 +1,9 @@
 /* Estimates the fastest schedule by the LogGP model (Alexandrov, Ionescu, Schauser, Scheiman, 1995): each message takes
  * an overhead on its sender and its receiver and a latency of the network, and each byte takes a gap.
  *
- * Every schedule packs and unpacks each fragment once. Schedules therefore differ only in their rounds: in the
- * number of messages that a rank sends, and in how often its bytes are sent. In a dense round (comp_messages.h)
- * empty messages count too. */
+ * Every schedule packs and unpacks each fragment once. Schedules therefore differ only in the number of messages that a
+ * rank sends, and in how often its bytes are sent. In a dense round, in which every partner sends to every other
+ * (comp_messages.h), empty messages count too. */
 #ifndef COMP_COMP_COST_H
 #define COMP_COMP_COST_H
 
@@ -19,7 +19,8 @@ typedef struct comp_machine {
  * between nodes; half of these times within a node. */
 extern const comp_machine comp_default_machine;
 
-/* The fragments of the busiest rank, which is the rank with most fragments. The cost of a route is estimated for it. */
+/* The load of the busiest rank, which is the rank with most fragments. The cost of a route is estimated for this
+ * rank. */
 typedef struct comp_load {
     int64_t fragments;
     double bytes;          /* average size of a fragment in a message, in bytes (comp_sheet.h) */
@@ -38,8 +39,9 @@ comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, con
 /* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the number of messages that the rank at this place (comp_route.h) sends in all rounds of the route, if all
- * rounds are dense and no message must be divided because of its length. */
+/* Returns the number of messages that a rank sends in all rounds of the route, if every partner sends to every other in
+ * each round and no message must be divided because of its length. place: the rank's number in the order of ranks by
+ * nodes (comp_route.h). */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

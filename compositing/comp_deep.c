@@ -1,6 +1,6 @@
-/* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures are blended by the same rule as
- * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples. It stores
- * the samples directly at their final position. */
+/* Fragments are converted to samples by comp_merge_intervals(), so that the samples of a deep picture are blended by
+ * the same rule as the pixels of an ordinary picture. Rank 0 receives from each owner of pixels first the number of
+ * samples of each pixel, and then the samples, which it stores directly at their final position. */
 #include "comp_deep.h"
 
 #include <string.h>
@@ -11,9 +11,10 @@
 
 enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 
-/* ---- on the owner ----------------------------------------------------------------------------------------------- */
+/* ---- making samples on the owner of a pixel --------------------------------------------------------------------- */
 
-/* Ensures space for one more item; returns false if memory ran out. */
+/* Ensures that the array *items, which contains `count` items of `size` bytes, has space for one more item; returns
+ * false if memory ran out. */
 static bool reserve_item(void **items, int64_t count, int64_t *capacity, size_t size)
 {
     if (count < *capacity) return true;
@@ -25,7 +26,8 @@ static bool reserve_item(void **items, int64_t count, int64_t *capacity, size_t 
     return true;
 }
 
-/* Callback of comp_merge_intervals(): adds a sample for the interval, unless it is invisible. */
+/* Callback of comp_merge_intervals(): converts the interval to a sample and adds the sample to the list, unless the
+ * sample is invisible. */
 static void add_interval(void *state, const fragment *f)
 {
     comp_deep_list *list = state;
@@ -67,7 +69,7 @@ void comp_deep_free(comp_deep_list *lists, int count)
     }
 }
 
-/* ---- to rank 0 -------------------------------------------------------------------------------------------------- */
+/* ---- sending samples to rank 0 ---------------------------------------------------------------------------------- */
 
 static int send_items(MPI_Comm comm, int tag, const void *items, int64_t count, size_t size)
 {
@@ -90,7 +92,7 @@ static int send_lists(MPI_Comm comm, const comp_deep_list *lists, int count)
     return code;
 }
 
-/* Receives messages of any length until count items have arrived. */
+/* Receives messages from the rank until `count` items have arrived, in whatever numbers the messages contain them. */
 static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t count, size_t size)
 {
     char *bytes = items;
@@ -159,8 +161,8 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
     }
     in->pixels = base_alloc((size_t)pixels * sizeof *in->pixels);
     if (samples > out->capacity) {
-        /* if a frame is composited in several turns (session_frame.c), each turn adds samples; the capacity includes
-         * space for them */
+        /* a frame may be composited several times (session_frame.c), and each time adds samples, so that the capacity
+         * includes space for further samples */
         const int64_t capacity = out->count ? samples + samples / 2 : samples;
         insitu_deep_sample *grown = base_realloc(out->samples, (size_t)capacity * sizeof *grown);
         if (grown) {

@@ -11,16 +11,17 @@
 enum { ROWS = 32 };
 
 /* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs by more than the limit
- * of comp_find_edges(). An sRGB code is nearly proportional to the square root of linear light. The test |sqrt(a) -
- * sqrt(b)| > c is replaced by (a - b)^2 > 2 c^2 (a + b) to avoid square roots. */
+ * of comp_find_edges(). An sRGB code is nearly proportional to the square root of linear light, so that the test should
+ * be |sqrt(a) - sqrt(b)| > c. To avoid square roots, it is replaced by (a - b)^2 > 2 c^2 (a + b): the difference a - b
+ * is (sqrt(a) - sqrt(b)) (sqrt(a) + sqrt(b)), and (sqrt(a) + sqrt(b))^2 is close to 2 (a + b) if a is close to b. */
 static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
     for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
-/* Sets the byte of a pixel at an edge. If is_shared is set, another thread may set bytes of the same row, and the byte
- * is set atomically. */
+/* Marks a pixel as lying at an edge. If is_shared is set, another thread may mark pixels of the same row, and the byte
+ * is written atomically. */
 static void mark_pixel(unsigned char *pixel, bool is_shared)
 {
     if (is_shared) {
@@ -43,8 +44,8 @@ static void mark_differing_pixel_pairs(const unsigned char *differ, int64_t pixe
     }
 }
 
-/* Marks the pixels of row y that differ from the pixel to their right, or from one of the three nearest pixels of the
- * next row. Also marks the pixel from which they differ. `differ` is a buffer of 4 bytes per pixel. */
+/* Compares each pixel of row y with the pixel to its right and with the three nearest pixels of the next row, and marks
+ * both pixels of each pair that differs. `differ` is a buffer of 4 bytes per pixel. */
 static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;

@@ -42,9 +42,9 @@ static void divide_blocks(comp_grid *g)
         g->row_shift--;
 }
 
-/* Returns the grid. Blocks are nearly square, and as small as possible without exceeding COMP_TARGET_BLOCKS. If there
- * are many ranks, blocks are divided further, until there are enough for every rank or a block is one row of a
- * strip. */
+/* Divides the picture into blocks that are nearly square, and as small as possible without exceeding COMP_TARGET_BLOCKS
+ * blocks. If there are many ranks, blocks are divided further, until there are enough for every rank or a block is one
+ * row of a strip. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
@@ -71,13 +71,13 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
     /* random number between 0 and 1; it may be rounded to 1 */
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f;
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
-    /* the priority in steps of 1/16, from 0 to about 1800 */
+    /* the priority as an integer from 0 to about 1800, in units of 1/16 */
     const int steps = (int)(16 * (chance + 3));
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
-/* Stores in loads[] the number of fragments that each rank owns. Returns the mean number of fragments of the ranks that
- * own blocks, rounded up. */
+/* Stores in loads[r] the number of fragments in the blocks that rank r owns. Returns the mean of these numbers over the
+ * ranks that own blocks, rounded up. */
 static uint64_t compute_equal_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;
@@ -92,12 +92,12 @@ static uint64_t compute_equal_share(const comp_claim *claims, uint32_t blocks, u
     return owners ? (all + owners - 1) / owners : 0;
 }
 
-/* The state of a pass that moves blocks to other owners. Blocks and the ranks that receive them are visited in the same
- * order, so that most blocks stay near their neighbours. A block is moved if the move brings the loads of the old and
- * the new owner closer to the equal share. If no rank can receive the block under this condition, the new owner may
- * exceed the share by an eighth of the block's fragments, then by two eighths, and so on, until any rank below the
- * share may receive the block. As long as one rank is above the share, another rank is below it. No rank loses its last
- * block, so that the current owners of blocks are the only possible receivers. */
+/* The state of a pass that moves blocks from ranks with more fragments than the equal share (the mean) to ranks with
+ * fewer. Blocks and the ranks that receive them are visited in the same order, so that most blocks stay near their
+ * neighbours. A block is moved to a rank if the excess of that rank over the equal share is afterwards at most
+ * allowed_excess eighths of the block's fragments. If no rank satisfies this condition, allowed_excess is increased by
+ * one, until any rank below the share may receive the block. As long as one rank is above the share, another rank is
+ * below it. No rank loses its last block, so that only ranks that own blocks can receive further ones. */
 typedef struct owner_search {
     const comp_claim *claims;
     uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is considered next */

@@ -10,10 +10,10 @@ enum {
     COMP_LANES = 16,
     COMP_ROWS = 32, /* maximum number of rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
-    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks, chosen so that a message with the claims to all blocks is
-                                     small */
-    COMP_BLOCKS_PER_RANK = 60,    /* minimum mean number of blocks per rank */
-    COMP_COUNTED_RANKS_MAX = 1024 /* maximum number of ranks to which the number of blocks is adapted */
+    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks; few enough that a message with the claims to all blocks
+                                     is small */
+    COMP_BLOCKS_PER_RANK = 60,    /* minimum number of blocks, divided by the number of ranks */
+    COMP_COUNTED_RANKS_MAX = 1024 /* the number of blocks grows with the number of ranks up to this number of ranks */
 };
 
 typedef struct comp_grid {
@@ -89,7 +89,7 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
     return (y + at / COMP_LANES) * grid->width + x + at % COMP_LANES;
 }
 
-/* ---- who owns a block ------------------------------------------------------------------------------------------- */
+/* ---- owners of blocks ------------------------------------------------------------------------------------------- */
 
 /* A rank's claim to own a block. Claims of several ranks are combined by comp_claim_add(): the combined claim has the
  * largest of their priorities, which contains the rank that will be the owner, and the sum of their numbers of
@@ -122,11 +122,12 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
     sum->priority = sum->priority > claim->priority ? sum->priority : claim->priority;
 }
 
-/* Balances the number of fragments per owner: moves blocks from ranks with more than the mean to other owners, until no
- * rank exceeds the mean by more than the number of fragments in the block with most fragments. The claims must be the
- * combined claims of all ranks, which are the same on every rank; so are the changed claims. loads has one entry per
- * rank and receives the number of fragments that the rank owns. A rank without blocks does not receive any: if one rank
- * has nearly all fragments, it keeps them, so that most of them need not be sent. */
+/* Balances the number of fragments per owner: moves blocks from ranks with more than the mean to other owners of
+ * blocks, until no rank exceeds the mean by more than the number of fragments in the block with most fragments. The
+ * claims must be the combined claims of all ranks, which are the same on every rank; the changed claims are then also
+ * the same on every rank. loads has one entry per rank and receives the number of fragments that the rank owns. A rank
+ * without blocks does not receive any: if one rank has nearly all fragments, it keeps them, so that most of them need
+ * not be sent. */
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
 
 #endif

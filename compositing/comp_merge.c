@@ -13,8 +13,8 @@
  * two neighbouring cuts, each interval that spans both is treated as a homogeneous medium, and the optical depths and
  * the light of these media are added:
  *
- *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... between the cuts
- *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares
+ *     |-- a ------------|            -ln T  = sum of the parts of -ln Ta, -ln Tb ... between the cuts
+ *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these parts
  *     |  a   |  a and b |   b   |
  *
  * The renderer makes intervals short enough for this approximation (render/volume/kernel_segments.h). */
@@ -50,8 +50,8 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
     items[root] = moving;
 }
 
-/* Sorts by heap sort, which needs no memory and no recursion, and takes O(n log n) in the worst case too, because with
- * some partitions a pixel has thousands of fragments. */
+/* Sorts by heap sort, which needs no memory and no recursion and takes O(n log n) in the worst case too. The worst case
+ * matters, because with some partitions of the mesh a pixel has thousands of fragments. */
 static void heap_sort(fragment *items, int64_t count)
 {
     if (count <= insertion_limit) {
@@ -87,9 +87,10 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* The state of a pass over the sorted samples at one position of the ray. The pass determines which samples are
- * blended. If a volume has one sample at the end of a cell and another at the start of a cell, the cells are neighbours
- * whose common face was rounded to two positions. Only one of the two samples is then blended. */
+/* The state of a pass over the sorted samples at one position of the ray, which determines the samples that are
+ * blended. If a volume has one sample at the end of a cell and another at the start of a cell, the two cells are
+ * neighbours, and rounding has placed their common face at two positions; only one of the two samples is then
+ * blended. */
 typedef struct sample_pass {
     uint32_t layer; /* index of the volume layer to which the most recent sample belongs */
     /* number of samples at the start of their cell that no sample at a cell's end has matched yet */
@@ -124,8 +125,8 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
  * not include that header. */
 static const float face_error = 4e-6f;
 
-/* Advances *next past all fragments that begin before t by more than the rounding error of a face's t. Returns the
- * largest t_out of the volume fragments that were passed, or `reach` if it is larger. */
+/* Advances *next past all fragments that begin before t by more than the rounding error of the t at which a ray crosses
+ * a face. Returns the largest t_out of the volume fragments that were passed, or `reach` if it is larger. */
 static float find_furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -199,7 +200,8 @@ static void blend_mixture(blend *b, const fragment *items, int64_t count, float 
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
         const double emitted =
-            /* own / absorbed, or its limit if transmittance is so close to 1 that absorbed is 0 */
+            /* the optical depth divided by the opacity, or the limit of this quotient if transmittance is so close to 1
+             * that the opacity is 0 */
             absorbed > 0 ? own / absorbed : share;
         for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] * emitted;
         depth += own;
@@ -216,8 +218,8 @@ static void swap_fragments(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves the intervals that end behind t = `depth` to the front of the list, without changing their order. Returns the
- * number of these intervals. */
+/* Moves the fragments whose intervals end behind t = `depth` to the front of the list, without changing their order.
+ * Returns the number of these fragments. */
 static int64_t move_unfinished_intervals_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
@@ -271,10 +273,10 @@ static void blend_interval(blend *b, const fragment *items, int64_t count, float
 }
 
 /* Blends fragments from the first one on until no interval is open; returns the number of blended fragments. An
- * interval is open at a point of the ray if it begins at or before this point and ends behind it. Open intervals are
- * kept at the front of the list, so that the cost between two cuts depends only on the number of intervals mixed there:
- * a long interval beside a thousand consecutive short ones costs a thousand mixtures of two. At the end the fragments
- * are in their original order. */
+ * interval is open at a point of the ray if it begins at or before this point and ends behind it. Fragments with open
+ * intervals are kept at the front of the list, so that the cost between two cuts depends only on the number of
+ * intervals mixed there: a long interval beside a thousand consecutive short ones costs a thousand mixtures of two
+ * media. At the end the fragments are in their original order. */
 static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, const interval_sink *sink)
 {
     float at = sorted[0].t_in;
@@ -334,8 +336,8 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     *out_depth = find_depth_of_nearest_surface(items, count);
 }
 
-/* Returns the number of leading fragments that are folded into one (fragment_fold.h): volume fragments in the same
- * interval of the ray. */
+/* Returns the number of leading fragments that are blended into one (folded, fragment_fold.h): volume fragments that
+ * begin in the same one of the intervals of fixed length into which folding divides the ray. */
 static int64_t count_fragments_to_fold(const fragment *sorted, int64_t count)
 {
     const int32_t interval = fragment_interval_number(sorted[0].t_in);
@@ -345,9 +347,10 @@ static int64_t count_fragments_to_fold(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Returns whether the fragments blended so far hide the fragment `next`; `before` is the last blended fragment. If
- * `next` is in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may
- * have omitted fragments of later intervals (fragment_fold.h). */
+/* Returns whether the fragments blended so far hide the fragment `next`; `before` is the last blended fragment, and the
+ * transmittance is that of all of them. Folding divides the ray into intervals of fixed length. If `next` is in a later
+ * one of these intervals than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may have
+ * omitted fragments of later intervals (fragment_fold.h). */
 static bool is_hidden_behind(float transmittance, const fragment *before, const fragment *next)
 {
     return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&

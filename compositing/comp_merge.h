@@ -13,9 +13,9 @@ typedef void comp_interval_callback(void *state, const fragment *stretch);
  * passed. sorted: the pixel's fragments in the order of comp_merge_pixel(); the order is the same on return. Local. */
 void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
-/* Calls the callback for each fragment that comp_merge_folded_pixel() blends, front to back. For volumes there is one
- * such fragment per interval of the ray, or per part of an interval if surfaces divide it. It is folded from all of the
- * pixel's volume fragments there (fragment_fold.h). Surface hits are passed unchanged. Local. */
+/* Calls the callback for each fragment that comp_merge_folded_pixel() blends, front to back. The ray is divided into
+ * intervals of fixed length; all volume fragments in one of these intervals, or between two surfaces that divide it,
+ * are blended into one fragment before it is passed (fragment_fold.h). Surface hits are passed unchanged. Local. */
 void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
 #endif

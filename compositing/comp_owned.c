@@ -18,12 +18,13 @@ typedef struct merge_scratch {
     comp_sheet joined; /* sheet of the fragments joined so far, one per pixel */
     comp_sheet other;  /* the sheet that is joined next */
     comp_sheet pixels; /* the finished pixels */
-    /* remaining: the fragments of mixed pixels except the one in `joined`; listed: all fragments of mixed pixels. Their
-     * .pixel is the index in the strip. */
+    /* remaining: the fragments of mixed pixels (pixels with several fragments that must be blended), except the one in
+     * `joined`; listed: all fragments of these pixels. In both lists, .pixel is the index of the pixel in the strip. */
     fragment_list remaining, listed;
-    uint16_t mixed[COMP_ROWS]; /* for each row of the strip, the bit mask of its mixed pixels; bit i is column i */
-    /* counts: for each mixed pixel, the number of its fragments. ends: for each mixed pixel, the index in `listed`
-     * behind its last fragment; list_mixed_pixels() reduces it to the index of its first fragment */
+    uint16_t mixed[COMP_ROWS]; /* for each row of the strip, the bit mask of the pixels that have several fragments
+                                  to be blended; bit i is column i */
+    /* For each pixel in the masks `mixed`: counts is the number of its fragments, and ends the index in `listed` behind
+     * its last fragment. list_mixed_pixels() reduces ends to the index of the pixel's first fragment. */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;
@@ -39,10 +40,10 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
     return true;
 }
 
-/* ---- join fragments in a sheet ---------------------------------------------------------------------------------- */
+/* ---- joining the fragments of a strip --------------------------------------------------------------------------- */
 
-/* Marks a pixel as mixed, so that all of its fragments are listed and merged one by one. Does nothing if it is marked
- * already. The fragment that m->joined contains for the pixel is counted as its first fragment. */
+/* Marks a pixel as mixed: all of its fragments will be listed, and merged by comp_merge_pixel(). Does nothing if the
+ * pixel is marked already. The fragment that m->joined contains for the pixel is counted as its first fragment. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
@@ -63,7 +64,8 @@ static bool add_remaining_fragment(merge_scratch *m, const fragment *item, uint3
 }
 
 /* Adds a fragment for a pixel for which the sheet m->joined already contains one. If both are hits of opaque surfaces,
- * the sheet keeps the nearer one. Otherwise the pixel becomes mixed. */
+ * the sheet keeps the nearer one. Otherwise the fragments of the pixel must be blended, and the new fragment is listed
+ * in m->remaining. */
 static bool join_with_earlier_fragment(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
@@ -119,9 +121,10 @@ static bool join_fragments_of_strip(const comp_owned *owned, uint32_t strip, mer
     return true;
 }
 
-/* ---- list the fragments of mixed pixels ------------------------------------------------------------------------- */
+/* ---- listing the fragments of pixels with several --------------------------------------------------------------- */
 
-/* Returns the first mixed pixel with at least the index `from`; COMP_STRIP_PIXELS if there is none. */
+/* Returns the smallest index, at least `from`, of a pixel that is marked in m->mixed; COMP_STRIP_PIXELS if there is
+ * none. */
 static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
 {
     for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
@@ -131,8 +134,8 @@ static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
     return COMP_STRIP_PIXELS;
 }
 
-/* Copies all fragments of mixed pixels to m->listed, sorted by pixel. On return, the fragments of pixel k begin at
- * index ends[k] of this list. Returns false if memory ran out. */
+/* Copies all fragments of the pixels that are marked in m->mixed to m->listed, sorted by pixel. On return, the
+ * fragments of pixel k begin at index ends[k] of this list. Returns false if memory ran out. */
 static bool list_mixed_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;
@@ -148,8 +151,8 @@ static bool list_mixed_pixels(merge_scratch *m)
     return true;
 }
 
-/* For deep pictures: adds all pixels with a fragment to the mixed pixels, because the samples of a deep picture are
- * made from the listed fragments of mixed pixels. */
+/* Marks all pixels with a fragment as if they had several, because the samples of a deep picture are made from the list
+ * of the fragments of marked pixels. */
 static void mark_all_mixed(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)

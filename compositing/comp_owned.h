@@ -13,7 +13,7 @@ typedef struct comp_owned {
     const comp_strips *traced_strips; /* fragments that this rank has traced, by strip */
     comp_received arrivals;           /* fragments received from other ranks for these strips */
     const comp_owners *owners;
-    int place; /* this rank's place (comp_route.h) */
+    int place; /* this rank's number in the order of ranks by nodes, called its place (comp_route.h) */
 } comp_owned;
 
 /* Merges all fragments of the strips. If merged->out is not NULL, it receives the pixels, and the background in pixels

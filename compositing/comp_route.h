@@ -46,7 +46,8 @@ typedef struct comp_route {
     comp_nodes nodes;
     int round_count;
     int radix[COMP_MOST_ROUNDS]; /* for each round, the number of ranks that exchange fragments with each other */
-    /* largest number of ranks in a dense round; comp_route_of() sets it to the maximum, COMP_MAX_DENSE_RANKS */
+    /* Largest number of ranks that exchange fragments in a dense round, in which every partner sends to every other.
+     * comp_route_of() sets it to the maximum, COMP_MAX_DENSE_RANKS. */
     int max_dense_ranks;
 } comp_route;
 
@@ -54,12 +55,13 @@ typedef struct comp_route {
  * ranks; other schedules ignore `radix`. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* comp_route_position() converts a rank to its place, and comp_route_rank() a place to its rank. */
+/* Every rank has a place: its number in an order in which the ranks of a node are consecutive. comp_route_position()
+ * returns a rank's place, and comp_route_rank() the rank at a place. */
 int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* Returns the difference between the places of partners whose digits of this round differ by 1: the product of the
- * radices of earlier rounds. */
+/* Returns the place value of the round's digit: the product of the radices of earlier rounds. A place is a number with
+ * one digit per round; the places of two partners whose digits of this round differ by 1 differ by this value. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)
@@ -67,22 +69,23 @@ static inline int comp_route_digit(const comp_route *route, int round, int strid
     return place / stride % route->radix[round];
 }
 
-/* Returns the place of one of the partners of `place` in the round: the partner whose digit of this round is `digit`.
- * The places of all partners are equal in their other digits. */
+/* Returns the place of one of the partners of `place` in the round: the place whose digit of this round is `digit` and
+ * whose other digits are those of `place`. stride: result of comp_route_stride() for the round. */
 static inline int comp_route_partner(const comp_route *route, int round, int stride, int place, int digit)
 {
     return place + (digit - comp_route_digit(route, round, stride, place)) * stride;
 }
 
-/* Returns whether the round is dense: every partner sends to every other. In a sparse round only partners that have
- * fragments send. */
+/* Returns whether the round is dense: every partner sends a message to every other, even an empty one. In a sparse
+ * round only partners that have fragments send. */
 static inline bool comp_route_is_dense(const comp_route *route, int round)
 {
     return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* Replaces the rank in each claim, which is the owner of a block, by the rank's place. If this place is not one of the
- * first ones, which belong to owners, the block is given to the rank's partner. */
+/* Each claim contains the rank that owns a block. Replaces this rank by its place (comp_route_position()). If the place
+ * is not one of the first ones, which belong to owners, the block is given to the place of the rank's partner, to which
+ * the rank sends its fragments before the first round. */
 void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */

@@ -19,8 +19,8 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* ROW_PIXELS is the width of the renderer's tiles, and MOST_PIXELS the number of pixels of such a tile. Larger tiles
- * are processed correctly, but more slowly. */
+/* The renderer's tiles have a width and height of ROW_PIXELS pixels. Larger tiles are processed correctly, but more
+ * slowly. */
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block of memory that grows without keeping its contents. */
@@ -30,7 +30,8 @@ typedef struct buffer {
 } buffer;
 
 struct comp_tile_scratch {
-    /* array of int64_t with one entry per pixel and a final one: the index in `order` of each pixel's first fragment */
+    /* array of int64_t: for each pixel of the tile, the index in `order` of the pixel's first fragment; a final entry
+     * has the number of fragments */
     buffer starts;
     buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
     buffer pixel_fragments; /* copies of one pixel's fragments; they are sorted in this buffer */
@@ -131,8 +132,9 @@ static void clear_empty_tile(const comp_tiles *tiles, const pixel_area *area)
     clear_tile(tiles, area);
 }
 
-/* Returns the pixel's index in the area, row by row. The truncated quotient is exact: half a pixel is added, so that
- * the quotient is far from integers compared with its rounding error. */
+/* Returns the index that the pixel has in the area, whose pixels are counted row by row. The row is a quotient that is
+ * rounded down. Half a pixel is added to the dividend, so that the quotient is further from an integer than its
+ * rounding error, and the row is exact. */
 static uint32_t find_index_in_area(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;

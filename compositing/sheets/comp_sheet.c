@@ -16,8 +16,8 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
     return &comp_sheet_plain;
 }
 
-/* Plans how to pack a sheet with many gaps: its `count` values are first moved together, so that they fill rows of 16
- * without gaps. This saves time, because a row with few values takes as long to pack as a full one. */
+/* Plans how to pack a sheet of which few pixels have values: its `count` values are first moved together, so that they
+ * fill rows of 16 without gaps. This saves time, because a row with few values takes as long to pack as a full one. */
 static void plan_rows_without_gaps(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;

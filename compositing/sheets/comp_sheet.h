@@ -31,7 +31,8 @@ enum { COMP_WORDS = 7, COMP_PIXEL_WORDS = 5, COMP_SHEET_HEAD = 20, COMP_SHEET_SL
  * RGBA of a finished pixel. */
 typedef struct comp_sheet {
     uint32_t words[COMP_WORDS]
-                  [COMP_STRIP_PIXELS]; /* indexed by comp_grid_index_in_strip(); words of absent pixels are undefined */
+                  [COMP_STRIP_PIXELS]; /* for each word, its value in each pixel of the strip
+                                          (comp_grid_index_in_strip()); undefined in pixels without a fragment */
     uint16_t masks[COMP_ROWS];         /* for each row, the bit mask of the pixels that have a fragment */
     uint32_t strip;
     /* set if all fragments are hits of opaque surfaces, so that only the nearest one is visible if sheets are joined */
@@ -82,8 +83,8 @@ static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint
 typedef struct comp_sheet_head {
     uint32_t strip;
     uint16_t bytes, count; /* size of the packed sheet in bytes; number of its pixels */
-    uint32_t rows, full;   /* bit masks of the strip's rows: those that have a pixel, and those that have all 16
-                              pixels */
+    uint32_t rows, full;   /* bit masks over the strip's rows: `rows` has the rows with at least one pixel, `full`
+                              the rows with all 16 pixels */
     uint32_t kinds;        /* how each word is stored (enum word_kind in comp_sheet_rows.h), in two bits per word */
 } comp_sheet_head;
 
@@ -111,7 +112,8 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
 
 /* Adds the fragments of `other` to `all`. If both contain a fragment for a pixel and all fragments of both sheets are
  * hits of opaque surfaces, `all` keeps the nearer fragment. Otherwise `all` keeps its own fragment, and the pixel's bit
- * is set in left[], which has one mask per row; the caller must then merge the fragment of `other`. */
+ * is set in left[], which has one mask per row; the caller must then merge the fragment that `other` has for this
+ * pixel. */
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
 
 /* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel that has only this

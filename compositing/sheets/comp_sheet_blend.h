@@ -16,7 +16,7 @@
  * pixel. */
 enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WORD_DEPTH = 0, WORD_RGBA = 1 };
 
-/* ---- joining ---------------------------------------------------------------------------------------------------- */
+/* ---- joining two sheets ----------------------------------------------------------------------------------------- */
 
 /* Returns the lanes in the mask `both` in which the fragment of `other` is nearer than the fragment of `all`. Fragments
  * whose t_in are equal or NaN are compared by fragment_compare(). */
@@ -55,7 +55,7 @@ static void join_sheets(comp_sheet *all, const comp_sheet *other, uint16_t left[
     all->is_opaque = are_opaque;
 }
 
-/* ---- finishing -------------------------------------------------------------------------------------------------- */
+/* ---- blending over the background ------------------------------------------------------------------------------- */
 
 static void finish_pixels(const comp_sheet *fragments, const float background[4], comp_sheet *pixels)
 {
@@ -81,7 +81,7 @@ static void finish_pixels(const comp_sheet *fragments, const float background[4]
     }
 }
 
-/* ---- storing ---------------------------------------------------------------------------------------------------- */
+/* ---- storing pixels in the picture ------------------------------------------------------------------------------ */
 
 /* The addresses of a row of the picture. */
 typedef struct picture_row {

@@ -11,12 +11,14 @@
  * row if it has a pixel in this row but none in the rows above. Its value is then predicted from another lane. */
 typedef struct sheet_plan {
     int rows, count; /* rows: number of rows that contain pixels; count: number of pixels in all rows */
-    bool is_sparse;  /* true: the sheet is compacted before packing, so that fresh and source are not set */
+    bool is_sparse;  /* true: the sheet has many gaps, and its pixels are moved together before packing; fresh and
+                        source are then not set */
     /* For each row that contains pixels: row is its index in the strip, number the number of its pixels, mask the bit
      * mask of the lanes with a pixel, and fresh the bit mask of the fresh lanes. */
     uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose most recent value predicts it */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each lane that has no pixel in the rows above (fresh): the lane
+                                              whose most recent value predicts its value */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {

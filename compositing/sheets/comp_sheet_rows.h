@@ -18,8 +18,8 @@ static uint8_t find_nearest_lane(unsigned known, int lane)
     return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
 }
 
-/* Sets plan->fresh to the lanes that have no pixel in the rows above, and plan->source to the lanes that predict
- * them. */
+/* Sets plan->fresh, for each row, to the lanes that have a pixel in this row but none in the rows above, and
+ * plan->source to the lanes from whose values those of the fresh lanes are predicted. */
 static void find_fresh_lanes(sheet_plan *plan)
 {
     unsigned known = plan->mask[0];
@@ -75,7 +75,8 @@ ROWS_INLINE lanes zigzag_decode(lanes value)
     return value >> 1 ^ -(value & 1);
 }
 
-/* Updates the prediction with the values of a row. In fresh lanes the slope stays 0. */
+/* Updates the prediction with the values of a row. In fresh lanes, which have no value in an earlier row, the slope
+ * stays 0. */
 ROWS_INLINE void update_prediction(prediction *f, lanes values, unsigned mask, unsigned fresh)
 {
     const lanes step = values - f->last;
@@ -94,7 +95,7 @@ ROWS_INLINE void start_prediction(prediction *f, lanes values)
     f->slope = (lanes){0};
 }
 
-/* ---- nibbles ---------------------------------------------------------------------------------------------------- */
+/* ---- packing residuals by their number of nibbles --------------------------------------------------------------- */
 
 static inline unsigned count_nibbles(uint32_t greatest)
 {
@@ -127,7 +128,8 @@ ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int
     uint64_t low, high;
     memcpy(&low, &half, sizeof low);
     memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
-    low |= high << 4; /* the lanes from `count` on are 0, so nothing is overwritten */
+    low |= high << 4; /* the shift and OR pack two half bytes into one byte; lanes from `count` on are 0, so that no
+                         half byte is overwritten */
     memcpy(out, &twos, sizeof twos);
     out += (nibbles & 4) / 2 * (size_t)count;
     memcpy(out, &ones, sizeof ones);
@@ -231,9 +233,10 @@ static void expand_sheet(const comp_sheet *compact, const sheet_plan *plan, int 
     }
 }
 
-/* ---- writing ---------------------------------------------------------------------------------------------------- */
+/* ---- packing sheets --------------------------------------------------------------------------------------------- */
 
-/* The residuals of a word for both predictions, indexed by WORD_LINEAR or WORD_CONSTANT. */
+/* The residuals of a word, and their number of nibbles, for each prediction (WORD_LINEAR or WORD_CONSTANT) and each
+ * row. */
 typedef struct word_residuals {
     lanes rows[2][COMP_ROWS];
     uint8_t nibbles[2][COMP_ROWS];
@@ -325,7 +328,7 @@ static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *pla
     return out;
 }
 
-/* ---- reading ---------------------------------------------------------------------------------------------------- */
+/* ---- unpacking sheets ------------------------------------------------------------------------------------------- */
 
 ROWS_INLINE lanes read_first(lanes residuals, unsigned mask, uint32_t value)
 {

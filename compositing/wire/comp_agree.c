@@ -1,5 +1,5 @@
-/* If several ranks fail with different statuses, all ranks return the largest status. The largest status is not the
- * most severe one; this rule only makes the choice deterministic. The status and the lowest rank that has it are
+/* If several ranks fail with different statuses, all ranks return the status with the largest number. This status is
+ * not the most severe one; the rule only makes the choice deterministic. The status and the lowest rank that has it are
  * encoded in one number, so that a single reduction by maximum finds both and can also reduce a second number. */
 #include "comp_agree.h"
 

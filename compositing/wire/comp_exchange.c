@@ -1,6 +1,6 @@
-/* Ranks forward parcels (comp_messages.h) without unpacking them. The owner merges the fragments of a pixel only after
- * it has received all of them: blending has rounding errors, so that pictures would depend on the schedule if
- * intermediate ranks merged fragments.
+/* Ranks forward the packed fragments for each owner (parcels, comp_messages.h) without unpacking them. The owner merges
+ * the fragments of a pixel only after it has received all of them: blending has rounding errors, so that pictures would
+ * depend on the schedule if intermediate ranks merged fragments.
  *
  * A rank on which an error occurs takes part in the remaining rounds without sending fragments, so that no rank waits
  * for it, and returns its error at the end. */
@@ -8,7 +8,8 @@
 
 #include "comp_pack.h"
 
-/* Runs the rounds of the route. Each round after the first forwards parcels that were received in earlier rounds. */
+/* Runs the rounds of the route. Each round after the first forwards the parcels (packed fragments for one owner) that
+ * were received in earlier rounds. */
 static insitu_status run_rounds(comp_transport *transport, const comp_route *route, comp_messages *out,
                                 comp_messages *held, insitu_status status, base_error *error)
 {

@@ -1,8 +1,9 @@
-/* Finished pixels are sent in sheets (comp_sheet.h), as fragments are. Owners send all strips of their blocks; a strip
- * without fragments takes only a header. A block without fragments has no owner, and rank 0 fills it with the
- * background. A rank with children in the gather tree forwards their messages as they arrive, through a buffer
- * allocated beforehand, and finally sends a message that marks the end. Rank 0 therefore needs no counts and receives
- * only from its own children, and its memory does not grow with the image or the number of ranks. */
+/* Finished pixels are packed and sent in the same format as fragments (sheets, comp_sheet.h). Owners send all strips of
+ * their blocks; a strip without fragments takes only a header. A block without fragments has no owner, and rank 0 fills
+ * it with the background. A rank that receives pixels from other ranks (its children in the tree of comp_gather.h)
+ * forwards their messages as they arrive, through a buffer allocated beforehand, and finally sends a message that marks
+ * the end. Rank 0 therefore needs no counts and receives only from its own children, and its memory does not grow with
+ * the image or the number of ranks. */
 #include "comp_gather.h"
 
 #include <string.h>
@@ -27,13 +28,13 @@ int comp_gather_children(const comp_route *route, int place)
     return ranks - 1 + below;
 }
 
-/* ---- to the parent ---------------------------------------------------------------------------------------------- */
+/* ---- sending to the parent in the gather tree ------------------------------------------------------------------- */
 
 /* The connection to the parent in the gather tree. */
 typedef struct parent_link {
     comp_transport *transport;
     int parent; /* rank of the parent in the gather tree */
-    int code;   /* first error code of an MPI call; MPI_SUCCESS: none has failed */
+    int code;   /* error code of the first MPI call that has failed; MPI_SUCCESS: none has failed */
 } parent_link;
 
 static void send_to_parent(parent_link *link, const unsigned char *message, int bytes)
@@ -64,7 +65,7 @@ static void send_own_pixels(parent_link *link, const comp_messages *finished)
     }
 }
 
-/* ---- from the children ------------------------------------------------------------------------------------------ */
+/* ---- receiving from the children in the gather tree ------------------------------------------------------------- */
 
 static int receive_message(comp_transport *transport, int *bytes)
 {

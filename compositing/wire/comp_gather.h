@@ -6,10 +6,11 @@
 #include "comp_messages.h"
 #include "image.h"
 
-/* Maximum number of children of a place in the gather tree, along which owners send their pixels to rank 0. It is a
- * tree of places (comp_route.h). Within a compute node, every place sends to the first place of this node. The first
- * places of all compute nodes form a heap, in which each has up to COMP_GATHER_FAN children. Without information about
- * compute nodes, each rank is treated as a compute node. */
+/* Maximum number of children of a place in the gather tree, along which owners send their pixels to rank 0. The nodes
+ * of this tree are places, which number the ranks so that those of a compute node are consecutive (comp_route.h).
+ * Within a compute node, every place sends to the first place of this compute node. The first places of all compute
+ * nodes form a heap, in which each has up to COMP_GATHER_FAN children. Without information about compute nodes, each
+ * rank is treated as a compute node. */
 enum { COMP_GATHER_FAN = 64 };
 
 /* comp_gather_parent() returns the place to which the given place (>= 1) sends; comp_gather_children() returns the

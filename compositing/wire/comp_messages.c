@@ -15,7 +15,7 @@ enum { TAG_ROUND = 32, TAG_FOLD = 8, LAST_MESSAGE_BYTES = COMP_MESSAGE_HEAD };
 
 static const unsigned char last_message[LAST_MESSAGE_BYTES] = {0};
 
-/* ---- messages --------------------------------------------------------------------------------------------------- */
+/* ---- lists and parcels of messages ------------------------------------------------------------------------------ */
 
 void comp_messages_free(comp_messages *messages)
 {
@@ -96,7 +96,7 @@ void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
     write_head(m, w->parcel, head[0], head[1] + records);
 }
 
-/* ---- rounds ----------------------------------------------------------------------------------------------------- */
+/* ---- rounds of messages ----------------------------------------------------------------------------------------- */
 
 insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error *error)
 {
@@ -123,7 +123,8 @@ typedef struct round {
     comp_transport *transport;
     int tag;
     bool is_sparse;
-    int open_partners;     /* number of partners that have not sent their last message; 0 in a sparse round */
+    int open_partners;     /* number of partners whose last message has not been received; not used in a sparse
+                              round, in which this number is unknown */
     comp_messages *in;     /* list to which received messages are appended */
     MPI_Request *requests; /* requests of this rank's sends */
     int request_count;

@@ -20,7 +20,7 @@ enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 1
 typedef struct comp_message {
     struct comp_message *next;
     int rank;  /* rank of the message's source or destination */
-    int bytes; /* number of valid bytes in data, without the slack behind them */
+    int bytes; /* number of bytes of the message in `data`, without the unused bytes behind them */
     unsigned char data[];
 } comp_message;
 
@@ -47,7 +47,7 @@ typedef struct comp_writer {
     comp_messages messages;
     int rank;
     size_t capacity; /* capacity of the last message in bytes */
-    size_t parcel;   /* offset of the last parcel in the last message; 0 if there is none */
+    size_t parcel;   /* offset in bytes of the last parcel in the last message; 0: the message has no parcel */
 } comp_writer;
 
 /* Returns space for `bytes` bytes in a parcel for the owner, or NULL if memory ran out. `expected` is an estimate of
@@ -58,14 +58,16 @@ unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t b
  * `records` is the number of fragments or finished pixels in these bytes. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
-/* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
+/* The communicator, and buffers allocated before the rounds, so that a rank can take part in the rounds even if it runs
+ * out of memory later. */
 typedef struct comp_transport {
     MPI_Comm comm;
     int rank;
     /* buffer of COMP_MESSAGE_BYTES bytes for messages that are forwarded, and for messages that are discarded for lack
      * of memory */
     unsigned char *receive_buffer;
-    MPI_Request *reserved_requests; /* one MPI request per partner of the longest dense round */
+    MPI_Request *reserved_requests; /* COMP_MAX_DENSE_RANKS MPI requests: one for each partner of the largest round
+                                       in which every partner sends to every other */
     comp_sheet *sheet;              /* scratch sheet in which rank 0 unpacks pixels */
     int64_t sent_bytes, sent_messages;
 } comp_transport;

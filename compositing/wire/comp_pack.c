@@ -14,7 +14,7 @@ static insitu_status fail_for_memory(base_error *error, const char *what)
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory to %s fragments", what);
 }
 
-/* ---- fragments into messages ------------------------------------------------------------------------------------ */
+/* ---- packing fragments into messages ---------------------------------------------------------------------------- */
 
 /* The strips in which this rank has fragments, sorted by owner. */
 typedef struct owner_strips {
@@ -60,8 +60,9 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
     return true;
 }
 
-/* Packs the fragments of a part of the strips for one owner. The owner's strips with fragments are divided into
- * `shares` parts of about equal length; `share` is the index of the part. Returns false if memory ran out. */
+/* Packs this rank's fragments for one owner, in a part of the strips that contain such fragments. These strips are
+ * divided into `shares` parts of about equal length; `share` is the index of the part. Returns false if memory ran
+ * out. */
 static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
                        comp_writer *writer)
 {
@@ -76,10 +77,11 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     return is_ok;
 }
 
-/* The work that a thread packs at once: a part of this rank's fragments for all owners whose place has `digit` as its
- * first digit (comp_route.h). One partner of the first round gets these fragments; if `digit` is the first digit of
- * this rank's own place, they are kept for later rounds. Fragments that this rank owns itself are not packed. The
- * strips of each owner are divided into `shares` parts; `share` is the index of the part. */
+/* The fragments that a thread packs at once: a part of this rank's fragments for all owners whose place has `digit` as
+ * its first digit. A place is the number of a rank on the route, written with one digit per round (comp_route.h). One
+ * partner of the first round gets these fragments; if `digit` is the first digit of this rank's own place, they are
+ * kept for later rounds. Fragments that this rank owns itself are not packed. The strips of each owner are divided into
+ * `shares` parts; `share` is the index of the part. */
 typedef struct batch {
     int digit, radix, place;
     int share, shares;
@@ -136,11 +138,11 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
     return fail_for_memory(error, "send");
 }
 
-/* ---- forwarding ------------------------------------------------------------------------------------------------- */
+/* ---- forwarding parcels ----------------------------------------------------------------------------------------- */
 
-/* Writes the parcels that belong to one partner of the round: those for owners whose place has the digit `digit` in
- * this round. Skips parcels for places that differ from this rank's place in a digit of an earlier round, because they
- * have been sent in that round. */
+/* Writes the parcels for one partner of the round. These are the parcels for owners whose place (comp_route.h) has the
+ * digit `digit` in this round. Skips parcels for owners whose place differs from this rank's place in a digit of an
+ * earlier round, because these parcels have been sent in that round. */
 static bool forward_parcels_with_digit(const comp_messages *in, const comp_route *route, int round, int place,
                                        int digit, comp_writer *writer)
 {
@@ -177,10 +179,11 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     return INSITU_OK;
 }
 
-/* ---- unpacking -------------------------------------------------------------------------------------------------- */
+/* ---- finding received sheets ------------------------------------------------------------------------------------ */
 
-/* Runs the two passes of a counting sort over the received sheets of an owner. If `sheets` is NULL, adds the number of
- * sheets of each strip to starts[strip]. Otherwise stores the address of each sheet in `sheets`. */
+/* One of the two passes of a counting sort that sorts the received sheets of an owner by strip. If `sheets` is NULL,
+ * adds the number of sheets of each strip to starts[strip]. Otherwise stores the address of each sheet in `sheets`, and
+ * reduces starts[strip], which is the end of the strip's addresses before the call, to their start. */
 static void count_or_store_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
     for (const comp_message *m = in->first; m; m = m->next) {

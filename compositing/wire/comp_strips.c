@@ -12,7 +12,7 @@ enum { LONGEST_SORTED = 64, LEAST_PART = 1 << 14, MOST_PARTS = 256 };
 
 _Static_assert(sizeof(fragment) == (1 + COMP_WORDS) * sizeof(uint32_t), "a fragment is a pixel and words");
 
-/* ---- ranges ----------------------------------------------------------------------------------------------------- */
+/* ---- ranges of fragments ---------------------------------------------------------------------------------------- */
 
 /* The ranges that one thread found in its part of the list, in the order of the list. */
 typedef struct part {
@@ -54,7 +54,8 @@ static void find_ranges(const comp_grid *grid, const fragment *items, int64_t fi
     if (range.count) add_range(p, range);
 }
 
-/* Copies the ranges of all parts to out->ranges, sorted by strip (counting sort). starts must be 0 before the call. */
+/* Copies the ranges of all parts to out->ranges, sorted by strip (counting sort). out->starts must contain only zeros
+ * before the call. */
 static void sort_ranges(const part *parts, int part_count, comp_strips *out)
 {
     uint32_t *const starts = out->starts, sum = 0;
@@ -129,7 +130,7 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
     return count;
 }
 
-/* ---- sheets ----------------------------------------------------------------------------------------------------- */
+/* ---- packing strips into sheets --------------------------------------------------------------------------------- */
 
 /* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one fragment. */
 static bool fill_sheet_of_single_fragments(const comp_strips *s, uint32_t strip, comp_sheet *sheet)

@@ -34,8 +34,8 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
 /* Buffers of one thread for comp_strips_pass_sheets(). A zeroed struct is empty. */
 typedef struct comp_layers {
     comp_sheet sheet;
-    /* index of each pixel's first fragment in `order`; while fragments are listed, the index behind its last
-     * fragment */
+    /* for each pixel of the strip, the index of its first fragment in `order`; while fragments are listed, the index
+     * behind its last fragment */
     uint32_t ends[COMP_STRIP_PIXELS + 1];
     const fragment **order;
     int64_t capacity;
