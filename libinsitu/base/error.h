@@ -12,8 +12,9 @@ typedef struct base_error {
     char message[1024]; /* message of the error; "" if status is INSITU_OK */
 } base_error;
 
-/* Makes the control characters of a text visible, such as ESC as "\\x1b", so that a name in a message cannot control a
- * terminal or begin a new line. text has space for capacity bytes; anything longer is cut off. */
+/* Makes the control characters of a text visible: ESC, for example, becomes "\\x1b". A name in a message can then
+ * neither control a terminal nor begin a new line. The memory at text has capacity bytes; text that does not fit is cut
+ * off. */
 void base_escape(char *text, size_t capacity);
 
 /* Records status and a printf-style message with its control characters escaped, and returns status. error may be NULL.

@@ -12,7 +12,7 @@
 
 #include "memory.h"
 
-/* ---- failures -------------------------------------------------------------------------------------------------- */
+/* ---- descriptions of failures ---------------------------------------------------------------------------------- */
 
 static bool fail_with_errno(file_failure *failure, int code)
 {
@@ -39,9 +39,9 @@ static bool fail_for_file_size(file_failure *failure, size_t limit)
     return false;
 }
 
-/* ---- opening --------------------------------------------------------------------------------------------------- */
+/* ---- opening regular files ------------------------------------------------------------------------------------- */
 
-/* Gets the status of the path. Anything other than a regular file is a failure. */
+/* Gets the status (struct stat) of the object at the path. Fails if the object is not a regular file. */
 static bool find_file_status(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
@@ -169,7 +169,7 @@ static bool make_folders(char *path)
     return true;
 }
 
-/* The folder and the file name of a path. Both strings are in the memory at `path`. */
+/* The folder and the file name of a path. The string `name` is a part of the memory at `path`. */
 typedef struct folder_and_name {
     char *path;
     const char *name;
@@ -222,8 +222,8 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
     return false;
 }
 
-/* Replaces the file. Tries again if another process has deleted the temporary file because it took it for the remains
- * of a killed run. */
+/* Replaces the file. Tries again if another process has deleted the temporary file. This happens if that process has
+ * taken it for the remains of a killed run. */
 static bool replace_file(const folder_and_name *target, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {

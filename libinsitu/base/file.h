@@ -11,8 +11,8 @@
 
 /* The reason why a call failed. */
 typedef struct file_failure {
-    /* set if there is no such file, or if the existing file must not be read or extended but file_replace() may replace
-     * it */
+    /* set if there is no such file; also set if the path is a symbolic link that must not be read or extended, but that
+     * file_replace() may replace */
     bool is_missing;
     bool is_out_of_memory; /* set if memory ran out */
     char reason[128];      /* text for messages, such as "Permission denied" */

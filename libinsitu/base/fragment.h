@@ -21,14 +21,15 @@ typedef struct fragment {
     float t_out;
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* from 0 for an opaque fragment to 1 for a transparent one */
-    uint32_t kind;       /* FRAGMENT_VOLUME or FRAGMENT_SURFACE, plus the values that the enum below describes */
+    uint32_t kind;       /* FRAGMENT_VOLUME or FRAGMENT_SURFACE, plus numbers for the layer and the position in the
+                            cell (enum below) */
 } fragment;
 
 /* Values of fragment.kind. A single sample of a volume has FRAGMENT_VOLUME + FRAGMENT_LAYER times the index of its
  * volume layer (0 .. 3). FRAGMENT_EARLY or FRAGMENT_LATE is added if the sample lies within rounding of the start or
- * end of its cell, because the cell before or behind may have the same sample. A fragment that combines several samples
- * or segments of a volume has the kind FRAGMENT_VOLUME. A hit has FRAGMENT_SURFACE + the index (0, 1, ...) of its
- * surface. */
+ * end of its cell's interval on the ray, because the preceding or the next cell may have the same sample. A fragment
+ * that combines several samples or segments of a volume has the kind FRAGMENT_VOLUME. A hit has FRAGMENT_SURFACE + the
+ * index (0, 1, ...) of its surface. */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
 /* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is

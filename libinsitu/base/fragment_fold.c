@@ -11,17 +11,17 @@ static void blend_behind(fragment *front, const fragment *behind)
     if (behind->t_out > front->t_out) front->t_out = behind->t_out;
 }
 
-/* Returns the height, above the leaves of the interval's binary tree, of the lowest node that contains both leaves. a
- * and b are indices of leaves. */
+/* Returns the height of the lowest node of the interval's binary tree that contains the leaves with the indices a and
+ * b. Leaves have the height 0. */
 static int find_common_height(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
 
 /* open[] is a stack of partial results. Each entry is the blend of those fragments of one tree node that have been read
- * so far; fragments of this node that are read later are added to it. heights[d], for d >= 1, is the height of the
- * lowest tree node that contains both open[d] and open[d - 1]. These heights decrease towards the top of the stack, so
- * that the stack has at most one entry per halving. */
+ * so far; fragments of this node that are read later are blended into the entry. heights[d], for d >= 1, is the height
+ * of the lowest tree node that contains both open[d] and open[d - 1]. These heights decrease towards the top of the
+ * stack, so that the stack has at most one entry per level of the tree. */
 fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];
@@ -44,13 +44,13 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
     return open[0];
 }
 
-/* ---- folding on one rank ----------------------------------------------------------------------------------------- */
+/* ---- blending the fragments of one rank -------------------------------------------------------------------------- */
 
 /* The state while a rank folds (blends) its fragments of one pixel in one interval of the ray parameter t. */
 typedef struct fold_part {
     float begin, end; /* range of the ray parameter in which this rank has all fragments of the pixel */
-    fragment *out;    /* the folded fragments */
-    int64_t count;    /* number of folded fragments */
+    fragment *out;    /* receives the blended fragments, and those that remain as they are */
+    int64_t count;    /* number of fragments in `out` */
 } fold_part;
 
 /* Returns the ray parameter t at which a leaf of the tree begins. leaf: index of the leaf (fragment_find_leaf()). The

@@ -20,9 +20,9 @@
 
 #include "fragment.h"
 
-/* The number of intervals per unit of t, and the number of times that an interval is halved. The scene has a size
- * near 1 in t (render.h), so that a ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that start
- * in the same leaf are folded front to back. */
+/* The number of intervals per unit of the ray parameter t, and the number of times that an interval is halved. The
+ * scene has a size near 1 in t (render.h), so that a ray has about ten intervals, and a smallest half (leaf) has a
+ * length of 4e-6 of the scene. Fragments that start in the same leaf are blended front to back. */
 enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
 /* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the rank
@@ -47,13 +47,14 @@ static inline int32_t fragment_interval_number(float t)
     return fragment_find_leaf(t) >> FRAGMENT_HALVINGS;
 }
 
-/* Folds the fragments of one interval to one fragment. They must be sorted (fragment_order.h) and must not contain a
- * surface; count >= 1. */
+/* Blends the fragments of one interval into one, along the interval's binary tree (top of this file). The fragments
+ * must be sorted (fragment_order.h) and must not contain a surface; count >= 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
-/* Folds the fragments of one interval on a rank that has all of the pixel's fragments between the ray
- * parameters `begin` and `end`. Only halves that lie completely between them are folded. out may be the same as sorted.
- * Returns the number of fragments in out. */
+/* Blends the fragments of one interval on a rank that has all of the pixel's fragments between the ray parameters
+ * `begin` and `end`. The interval is divided into halves, these into halves, and so on. The fragments of a half are
+ * blended into one only if the half lies completely between begin and end; all others are copied. out may be the same
+ * as sorted. Returns the number of fragments in out. */
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out);
 
 #endif

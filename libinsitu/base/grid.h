@@ -37,9 +37,9 @@ typedef struct grid_numbering {
     double inverse_outer[3];  /* 1 / outer; 0 along the axis of the largest stride */
 } grid_numbering;
 
-/* Returns the index along an axis that belongs to the flat index n. Each quotient (n + 1/2) / stride is rounded down.
- * Before that, it is at least 1/2 / stride away from the next integer. The two rounding errors change it by at most n /
- * stride * 2^-52, and therefore by less than this distance if n < 2^51. */
+/* Returns the index along an axis that belongs to the flat index n. It is computed from quotients (n + 1/2) / stride,
+ * which are rounded down. A quotient is at least 1/2 / stride away from the next integer. Its two rounding errors
+ * change it by at most n / stride * 2^-52, and therefore by less than this distance if n < 2^51. */
 static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64_t n)
 {
     const double whole = (double)n, outer = (double)(int64_t)((whole + 0.5) * of->inverse_outer[axis]);
@@ -83,11 +83,13 @@ typedef struct grid_array {
     const char *data;
     int64_t stride; /* distance between elements in bytes; if it is 0, all elements are read from the first one */
     bool is_wide;   /* elements have 8 bytes (double or int64); otherwise 4 bytes (float or int32) */
-    /* set if elements must not be read as float or double: they are integers or of an unusual type */
+    /* set if elements must not be read as float or double, because they are integers or can only be read by memcpy()
+     * (unusual_type) */
     bool is_integer;
     unsigned char unusual_type; /* one of the values of grid_unusual_type */
     int64_t base; /* in an array of indices or offsets, the index base, which is subtracted from each element */
-    /* number of entries of an array of offsets whose last entry is omitted; else 0 */
+    /* number of entries that the caller gives of an array of offsets without its last entry; 0: the array is
+     * complete */
     int64_t implied_end_count;
     int64_t implied_end; /* offset that the omitted last entry would have, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
@@ -181,7 +183,8 @@ static inline int64_t grid_element_bytes(const grid_array *a)
     }
 }
 
-/* Reads the element at an address in an array that has data. */
+/* Reads an element of the array as a double. element: the address of the element. The array must have data, and not
+ * coordinates that are computed from an axis. */
 static inline double grid_element_number(const grid_array *a, const char *element)
 {
     if (!a->is_integer)
@@ -411,13 +414,14 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Returns whether the cell is neither a ghost nor flat. Trees contain only such cells. */
+/* Returns whether the cell is neither a ghost nor omitted because it has no volume (grid.flat). Trees contain only such
+ * cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
 }
 
-/* Returns whether the cell is drawn or is a shell. Pictures may show these cells. */
+/* Returns whether pictures may show the cell: it is not a ghost, and it has a volume or is a shell. */
 static inline bool grid_can_be_shown(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));

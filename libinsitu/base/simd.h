@@ -468,8 +468,8 @@ SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDT
 /* A vector of doubles with half as many lanes as a vf, so that two such vectors correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
-/* Gathers one double from the address base + index for each lane of one half of the indices: the lower half if `half`
- * is 0, the upper half if it is 1. Indices count floats, not doubles. */
+/* Gathers one double from the address base + index, counted in floats, for each lane of one half of `index`: the lower
+ * half if `half` is 0, the upper half if it is 1. */
 SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
 {
 #if defined(SIMD_AVX512)
@@ -541,7 +541,7 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 /* vf_compress() for four lanes. bits: mask of the lanes that are stored. */
 SIMD_INLINE int simd_compress_four(float *to, unsigned bits, __m128 v)
 {
-    /* the bytes of the lanes in the order in which they are stored, for each mask */
+    /* for each mask, the indices of the bytes of the selected lanes, in the order in which these lanes are stored */
     enum { A = 0x03020100, B = 0x07060504, C = 0x0b0a0908, D = 0x0f0e0d0c };
     static const int32_t bytes[16][4] = {
         {A, A, A, A}, {A, A, A, A}, {B, A, A, A}, {A, B, A, A}, {C, A, A, A}, {A, C, A, A}, {B, C, A, A}, {A, B, C, A},

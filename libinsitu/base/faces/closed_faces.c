@@ -46,7 +46,7 @@ size_t closed_faces_lay_out(closed_faces *c, char *memory)
     return at.used;
 }
 
-/* ---- reading -------------------------------------------------------------------------------------------------- */
+/* ---- reading faces and numbering vertices --------------------------------------------------------------------- */
 
 static size_t hash_pair(uint64_t a, uint64_t b)
 {
@@ -113,8 +113,9 @@ void closed_edges_empty(closed_faces *c)
     for (int i = 0; i < 2 * c->table_size; i++) c->edges[i].low = -1;
 }
 
-/* Orients all faces that are connected with the face `first` by shared edges, so that they are consistent with it.
- * These faces are one connected piece of the surface. The index of the piece is stored for each of its faces. */
+/* Orients all faces that are connected with the face `first` by shared edges, so that their orientations are consistent
+ * with that of `first`. These faces are one connected piece of the surface. Stores the index of the piece for each of
+ * its faces. */
 static void orient_piece(closed_faces *c, int first)
 {
     int height = 0;
@@ -258,7 +259,8 @@ void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], 
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
         const bool is_reversed = c->piece_count > 1 && is_cavity(c, positions, piece);
-        /* from here on, piece_volume is 1, or -1 if the orientation of the piece's faces must be reversed */
+        /* from here on, piece_volume is not a volume, but 1, or -1 if the orientation of the piece's faces must be
+         * reversed */
         c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_reversed ? -1 : 1;
     }
     for (int face = 0; face < c->face_count; face++) c->orientation[face] *= (int)c->piece_volume[c->piece[face]];

@@ -16,7 +16,7 @@
 typedef struct closed_triangle {
     int vertex[3]; /* indices of the triangle's vertices in the polyhedron, in increasing order */
     int face;
-    /* 1 if the three vertices, in increasing order, run around the triangle in the direction that
+    /* 1 if the vertices, visited in increasing order of their indices, run around the triangle in the direction that
      * closed_faces_orient() has given to the face, else -1 */
     int orientation;
     /* set by closed_faces_orient_outward(): six times the volume of the tet between the triangle and the centre;

@@ -5,22 +5,23 @@
 
 #include "vector3.h"
 
-/* Tolerance for the area of a reversed triangle in the fan, as a fraction of the polygon's area. Smaller reversed
- * triangles are caused by rounding of nearly collinear corners; the tolerance is a few rounding errors of float32
- * coordinates. */
+/* Tolerance for triangles of a fan whose orientation is opposite to the polygon's, as a fraction of the polygon's area.
+ * Triangles of smaller area have this orientation only because the coordinates of nearly collinear corners are rounded;
+ * the tolerance is a few rounding errors of float32 coordinates. */
 static const double fan_slack = 0x1p-20;
 
 /* Area below which three corners of a polygon of width about 1 count as collinear. Projected positions have errors of a
  * few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
-/* NO_BLOCKER: there is an ear; NOT_CONVEX: there is none, because the corner is not convex. */
+/* Values of polygon_work.blocker that are not indices of corners. NO_BLOCKER: the corner and its two neighbours form an
+ * ear; NOT_CONVEX: they do not, because the corner is not convex. */
 enum { NO_BLOCKER = -1, NOT_CONVEX = -2 };
 
 /* The corners of a polygon, numbered in the order that polygon.h defines. */
 typedef struct polygon_work {
     int count;
-    /* 1 if the order of the corners runs in the direction of the caller's list, -1 if it runs in the opposite
+    /* 1 if the corners are numbered in the direction of the caller's list, -1 if they are numbered in the opposite
      * direction */
     int step;
     int *order;
@@ -28,8 +29,9 @@ typedef struct polygon_work {
     /* corners projected into a plane along the polygon's normal; the corners run counterclockwise in this plane */
     double (*projection)[2];
     int *next, *previous; /* doubly linked list of the corners that have not been cut off */
-    /* For each of these corners, the index of a corner that prevents an ear there, or one of the constants above. It is
-     * stored, because testing all corners again after every cut would take cubic time. */
+    /* For each corner that has not been cut off, the index of another corner because of which this corner and its two
+     * neighbours do not form an ear; or one of the constants above. The index is stored, because testing all corners
+     * again after every cut would take cubic time. */
     int *blocker;
     int (*triangles)[3];
     int triangle_count;
@@ -100,7 +102,7 @@ static bool scale_positions(polygon_work *w, const double (*p)[3])
     return true;
 }
 
-/* ---- fans ----------------------------------------------------------------------------------------------------- */
+/* ---- cutting into a fan --------------------------------------------------------------------------------------- */
 
 /* Returns whether the polygon can be cut into a fan from its first corner. `normal` receives the polygon's normal; its
  * length is twice the polygon's area. */
@@ -148,7 +150,7 @@ static void add_fan(polygon_work *w, int first)
     for (int i = w->next[first]; w->next[i] != first; i = w->next[i]) add_triangle(w, first, i, w->next[i]);
 }
 
-/* ---- ears ----------------------------------------------------------------------------------------------------- */
+/* ---- cutting off ears ----------------------------------------------------------------------------------------- */
 
 static void project_to_plane(polygon_work *w, const double normal[3])
 {
@@ -233,8 +235,8 @@ static int find_collinear_corner(const polygon_work *w, int first)
     return -1;
 }
 
-/* Updates the blockers after the corner `cut` between the corners a and c has been cut off. They may change at a and c,
- * where `cut` was the blocker, and at corners that coincide with a or c (does_edge_enter_corner()). */
+/* Updates `blocker` after the corner `cut`, whose neighbours are a and c, has been cut off. Values may change at a and
+ * c, at corners of which `cut` was the blocker, and at corners that coincide with a or c (does_edge_enter_corner()). */
 static void update_blockers(polygon_work *w, int a, int cut, int c)
 {
     int i = a;

@@ -2,9 +2,9 @@
  *
  * The triangles depend only on the positions of the corners. Two cells that share a face therefore get the same
  * triangles, although their lists of the face's corners may begin at different corners and run in opposite directions.
- * The polygon is projected along its normal, which is the sum of the area vectors of a fan's triangles. The corners are
- * ordered from the smallest position (by x, then y, then z) in the direction in which the list of positions is
- * lexicographically smaller, which usually means towards the smaller neighbour. If all triangles of the fan from the
+ * The polygon is projected along its normal, which is the sum of the area vectors of the triangles of any fan. The
+ * corners are ordered from the smallest position (by x, then y, then z) in the direction in which the list of positions
+ * is lexicographically smaller, which usually means towards the smaller neighbour. If all triangles of the fan from the
  * first corner have the polygon's orientation, the polygon is cut into this fan; this is the case for all convex
  * polygons. Otherwise ears are cut off, always the first ear after the first corner. An ear is a triangle of a corner
  * and its two neighbours that has the polygon's orientation and contains no other corner, not even on its sides. If a

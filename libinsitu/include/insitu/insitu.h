@@ -459,7 +459,8 @@ typedef struct insitu_report {
     /* number of cells that are not drawn because a value of the field in the cell or at its vertices is not finite. For
      * cells of higher order, only the pieces with such values are not drawn. */
     int64_t cells_unusable;
-    /* number of left-handed cells, whose corner volumes have a negative sum; they are drawn correctly nevertheless */
+    /* number of left-handed cells: the signed volumes that the edges at a cell's corners span (its corner volumes) have
+     * a negative sum; these cells are drawn correctly nevertheless */
     int64_t cells_inverted;
     /* number of cells without volume, which are not drawn. A cell counts if the sum of its absolute corner volumes is
      * at most 1.4e-14 of the volume of its bounding box, which is rounding; a polyhedron counts if all its vertices are
