@@ -30,7 +30,7 @@ char *session_make_database_path(const scene_database *database, const char *fil
     return path;
 }
 
-/* ---- lines ----------------------------------------------------------------------------------------------------- */
+/* ---- lines of the table ---------------------------------------------------------------------------------------- */
 
 /* Ensures that the text has space for `more` more bytes and a terminating NUL. Returns false if memory runs out. */
 static bool reserve_text(session_table *t, size_t more)
@@ -67,7 +67,8 @@ static void add_number(table_line *line, double number)
 }
 
 /* Adds a text to the line. The text is quoted if it contains a character that separates fields (RFC 4180). If a
- * spreadsheet would interpret it as a formula, it is preceded by `shield`, a character that prevents this. */
+ * spreadsheet would interpret the text as a formula, the character `shield`, which prevents this, is put before the
+ * text. */
 static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
@@ -121,7 +122,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
     add_text(line, "./", file, '\n');
 }
 
-/* ---- tables ---------------------------------------------------------------------------------------------------- */
+/* ---- tables in memory ------------------------------------------------------------------------------------------ */
 
 /* Removes the lines of the cycle `cycle` and of later cycles from the table. */
 static void drop_lines_from_cycle(session_table *t, int64_t cycle)
@@ -132,7 +133,8 @@ static void drop_lines_from_cycle(session_table *t, int64_t cycle)
     t->size = header + text_keep_lines_below(t->text + header, cycle);
 }
 
-/* Copies those lines of the table file in the folder that belong to cycles before `cycle`. */
+/* Appends to the table the lines of the existing file data.csv, whose content is `old`, that belong to cycles before
+ * `cycle`. Fails if the file has other columns. */
 static insitu_status copy_earlier_lines(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -217,7 +219,7 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
     return INSITU_OK;
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------------- */
+/* ---- files of the database ------------------------------------------------------------------------------------- */
 
 /* Returns whether a byte must be escaped in a string of the script data.js. Bytes above 0x7f need no escape, since the
  * script is UTF-8. */

@@ -38,8 +38,9 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the index of the output that has most recently written to this file, or -1 if there is none. A picture that
- * the output `output` itself wrote at the same cycle is ignored, because the step was repeated in that case. */
+/* Returns the index of an output whose last picture was written to this file, or -1 if there is none. `file` is the
+ * hash of the file's path. A picture that the output `output` itself wrote at the same cycle is ignored, because in
+ * that case the step was repeated. */
 static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
@@ -85,7 +86,8 @@ void session_record_written(session_overwrites *all, const scene *scene, int ima
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
         if (output->montage >= 0 && output->first_panel + drawn->variant.view > 0)
-            continue; /* the panels of a montage are written to one file, so that only the first is recorded */
+            continue; /* all panels of a montage are in one file, so that only the output of the first panel is
+                         recorded */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);

@@ -55,7 +55,8 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const char *data = a->data + first * a->stride;
             const uint64_t own =
                 a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-            sum += mix_bits(own, (uint64_t)block); /* blocks may be added to the sum in any order */
+            sum += mix_bits(own, (uint64_t)block); /* the sum does not depend on the order in which threads add
+                                                      blocks */
         }
         region_leave();
     }
@@ -137,9 +138,9 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Compares the checksums of the fields of one part. If the part is a block, returns the number of its fields whose
- * values are the same as at the most recently drawn picture, and leaves reporting them to the caller. If the part is a
- * whole mesh, adds its unchanged fields to the report and returns 0. The fields of mirror images are not counted. */
+/* Compares the checksums of all fields of one part of a mesh with those at the most recently drawn picture. If the part
+ * is a block, returns the number of unchanged fields, which the caller adds to the report. If the part is a whole mesh,
+ * adds its unchanged fields to the report and returns 0. The fields of mirror images are not counted. */
 static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;
@@ -157,7 +158,8 @@ static int64_t compare_part(const session_mesh *mesh, int threads, session_repor
     return unchanged;
 }
 
-/* Compares the checksums of blocks, each by one thread. Returns the number of fields that have not changed. */
+/* Compares the checksums of the fields of blocks; each block is processed by one thread. Returns the number of fields
+ * whose values have not changed. */
 static int64_t compare_blocks(const session_parts *parts, int threads)
 {
     int64_t unchanged = 0;

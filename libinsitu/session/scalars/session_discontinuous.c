@@ -39,7 +39,7 @@ static bool is_corner_field_used_by_scene(const session_mesh *mesh, const scene 
     return is_in;
 }
 
-/* ---- one mesh ------------------------------------------------------------------------------------------------- */
+/* ---- making one mesh discontinuous ---------------------------------------------------------------------------- */
 
 static int64_t find_shared_vertex_of_corner(const session_discontinuous *vertices, const insitu_mesh *given,
                                             int64_t corner)
@@ -154,7 +154,7 @@ static insitu_status update_discontinuous_mesh(session_meshes *meshes, session_m
     return is_discontinuous && !mesh->discontinuous.is_made ? make_discontinuous(mesh, threads, error) : INSITU_OK;
 }
 
-/* ---- all meshes ------------------------------------------------------------------------------------------------ */
+/* ---- making meshes discontinuous ------------------------------------------------------------------------------- */
 
 static bool has_corners(const session_catalogue *catalogue)
 {
@@ -169,7 +169,8 @@ insitu_status session_make_discontinuous(session_meshes *meshes, const session_c
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        /* in a mesh with finer lattices cells do not share nodes, so that the mesh need not be made discontinuous */
+        /* if cells of higher order are evaluated at additional nodes (finer.parts), cells do not share nodes, and the
+         * mesh need not be made discontinuous */
         const bool is_discontinuous = !mesh->finer.parts && is_corner_field_used_by_scene(mesh, scene);
         if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }

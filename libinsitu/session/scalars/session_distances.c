@@ -8,7 +8,7 @@
 #include "session_region.h"
 #include "session_scalars.h"
 
-/* ---- planes -------------------------------------------------------------------------------------------------- */
+/* ---- planes of slices ---------------------------------------------------------------------------------------- */
 
 static void offset_point(const double from[3], const double normal[3], double offset, double out[3])
 {
@@ -17,7 +17,8 @@ static void offset_point(const double from[3], const double normal[3], double of
 
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
 {
-    double middle[3], half = 0; /* centre of the bounds, and half of the bounds' extent along the normal */
+    double middle[3], half = 0; /* `middle` is the centre of the bounds, and `half` is half of the extent of the
+                                   bounds along the normal */
     for (int axis = 0; axis < 3; axis++) {
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
@@ -90,7 +91,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
     return true;
 }
 
-/* ---- distances ----------------------------------------------------------------------------------------------- */
+/* ---- distances of vertices from planes ----------------------------------------------------------------------- */
 
 static void compute_distances(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
 {
@@ -134,9 +135,10 @@ void session_update_distances(const session_meshes *meshes, const session_team *
     }
 }
 
-/* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so that no cell
- * crosses an isovalue that equals the minimum of all distances. If the minimum is 0 up to the tolerance, the isovalue
- * is therefore the minimum plus a tenth of the tolerance. This shift is large enough for float32, but not visible. */
+/* Returns the distance at which the isosurface is drawn that represents the slice, usually 0. A cell contributes to an
+ * isosurface only if one of its values is below the isovalue, so that the isosurface of the smallest distance is empty.
+ * If the smallest distance is between 0 and the tolerance, the isovalue is therefore this distance plus a tenth of the
+ * tolerance. This shift is large enough for float32, but not visible. */
 double session_choose_slice_isovalue(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

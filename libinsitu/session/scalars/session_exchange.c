@@ -17,9 +17,9 @@ void session_mail_free(session_mail *mail)
 /* ---- messages -------------------------------------------------------------------------------------------------- */
 
 /* A received message. Ranks do not know in advance which ranks send to them, so that the algorithm of Hoefler et al.
- * (2010) is used. Sends are synchronous, so that a rank's messages have been received when all of its sends are
- * complete. The rank then joins a non-blocking reduction. When the reduction is complete, the messages of all ranks
- * have been received. */
+ * (2010) is used. Sends are synchronous: a send completes only after its message is received. A rank whose sends are
+ * complete joins a non-blocking reduction. When the reduction is complete, the messages of all ranks have been
+ * received. */
 typedef struct message {
     struct message *next;
     int source_rank; /* rank that sent the message */

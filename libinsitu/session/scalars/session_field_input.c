@@ -27,8 +27,8 @@ int64_t session_count_corners(const insitu_mesh *mesh)
 }
 
 /* Returns the number of values that a field needs: the mesh's number of vertices, cells or corners, depending on the
- * field's centring. If the field has a corner_row, the result is the number of all entries from the first to the last
- * corner, including unused ones. */
+ * field's centring. If the values at corners are stored with a fixed distance from cell to cell (corner_row), the
+ * result is the number of all entries from the first to the last corner, including unused ones. */
 int64_t session_count_field_entries(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -42,8 +42,8 @@ static const char *describe_centring(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* Returns whether the field has an index. If the field needs no values, the address of its index may be NULL; then the
- * index's type shows whether there is one. */
+/* Returns whether the field has an index array. If no values are needed, the address of this array may be NULL; the
+ * field has an index if the array's type is given. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_count_field_entries(&mesh->original, field) == 0);
@@ -184,7 +184,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     return INSITU_OK;
 }
 
-/* Checks, before the fill function is called, the description of a field that has one. */
+/* Checks the description of a field with a fill function. The function has not been called yet. */
 static insitu_status check_fill_description(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
@@ -295,8 +295,8 @@ static void set_value_array(session_field *field, const insitu_field *given)
     field->values.is_integer = other.is_integer;
 }
 
-/* Sets the arrays of values, and records whether the field's copy must be computed again. The tables of patches and
- * components must have been copied before. */
+/* Sets the arrays from which the field's values are read, and records whether the session's copy of these values must
+ * be computed again. The tables of patches and components must have been copied before. */
 static void set_value_arrays(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                              bool is_stale)
 {

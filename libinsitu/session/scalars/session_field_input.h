@@ -9,8 +9,8 @@
 insitu_status session_set_field(session_meshes *meshes, const char *name, int64_t block, const insitu_field *field,
                                 base_error *error);
 
-/* Checks and stores a field's description on one part of a mesh. Fails if memory runs out, without storing the error,
- * or if the description is wrong; in that case the error is also stored with the field. Local. */
+/* Checks a field's description on one part of a mesh, and stores it. Returns an error if the description is wrong or if
+ * memory runs out; the error of a wrong description is also stored with the field. Local. */
 insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given,
                                      base_error *error);
 

@@ -28,7 +28,8 @@ static insitu_status call_fill_function(session_meshes *meshes, const session_me
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* If the call of the fill function has failed, it is not repeated in this step; the same error is returned. */
+/* A fill function is called at most once per step. If this call has failed, further calls of session_fill_field() in
+ * the same step return its error. */
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];

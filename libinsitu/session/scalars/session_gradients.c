@@ -12,9 +12,10 @@
  *
  * The weight of a corner is the determinant of its edges a, b and c, divided by the fourth power of the corner's length
  * l = sqrt(|a|² + |b|² + |c|²). The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver,
- * whose weight is almost 0. The factor 1 / l gives small cells more weight, because their gradients belong to nearer
- * positions. With this weight, errors of first order cancel in a mesh whose cells double their size at a vertex. The
- * product of weight and gradient is a sum of cross products, so that no division by a determinant is needed.
+ * whose weight is almost 0. The factor 1 / l gives small cells more weight, because their gradients are approximations
+ * at positions nearer to the vertex. With this weight, errors of first order cancel in a mesh whose cells double their
+ * size at a vertex. The product of weight and gradient is a sum of cross products, so that no division by a determinant
+ * is needed.
  *
  * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. Therefore
  * the result does not depend on the order of cells, of their vertices, or of ranks. The value of the integers' last bit
@@ -35,8 +36,9 @@
 #include "vector3.h"
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
-#define LOW_UNIT 0x1p44      /* value of one unit of a high word, in units of a low word */
-#define LEAST_SQUARE 0x1p-64 /* least sum of the squares of a corner's edges, in units of length squared */
+#define LOW_UNIT 0x1p44 /* value of one unit of a high word, in units of a low word */
+/* least sum of the squared lengths of a corner's edges, in units of the square of session_gradient_basis.length */
+#define LEAST_SQUARE 0x1p-64
 #define ROUNDING_SHIFT                                                                                                 \
     0x1.8p52 /* when this is added to a number below 2^51, the last bits of the result contain the nearest integer */
 
@@ -49,7 +51,7 @@ typedef struct node {
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* The data that one thread uses to add the contributions of corners. It adds them to fixed-point sums or, if `sums` is
+/* The data with which one thread adds the contributions of corners. They are added to fixed-point sums or, if `sums` is
  * NULL, to the bounds from which the value of the last bit of these sums is chosen. */
 typedef struct target {
     const session_gradient_basis *basis;
@@ -158,9 +160,9 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
     if (1 / squares > to->bounds.largest_inverse_square) to->bounds.largest_inverse_square = 1 / squares;
 }
 
-/* Adds the contribution of a corner. It is given by the corner's three sorted edges, and by the differences of the
- * fields along them. If two edges are exchanged, the signs of both the sum and the determinant change, so that the
- * gradient remains the same. */
+/* Adds the gradient at a corner of a cell to the sum of a vertex. The gradient is computed from the corner's three
+ * sorted edges and the differences of the fields along these edges. If two edges are exchanged, both the weighted
+ * gradient and the determinant change their signs, so that their quotient remains the same. */
 static inline __attribute__((always_inline)) void add_edge_gradient(target *to, int64_t vertex, const double edge[3][3],
                                                                     const double rise[3][SESSION_GRADIENTS],
                                                                     int field_count)
@@ -206,8 +208,9 @@ static inline __attribute__((always_inline)) void add_corner(target *to, const n
                       field_count);
 }
 
-/* Sets the third edge at a corner of a shell to the shell's normal, with the length of the other edges. Its sign does
- * not matter. */
+/* Sets the third edge at a corner of a shell to a normal of the shell. Its length is the square root of the area that
+ * the other two edges span. Its direction may be either of the two, because the field does not vary along the
+ * normal. */
 static void set_normal_edge(double edge[3][3])
 {
     vector3_cross(edge[0], edge[1], edge[2]);
@@ -383,7 +386,7 @@ static void add_shell(target *to, int64_t cell, node_list *list)
                          &list->nodes[(n + 1) % list->count]);
 }
 
-/* ---- all cells ----------------------------------------------------------------------------------------------- */
+/* ---- listing the cells that contribute ----------------------------------------------------------------------- */
 
 static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
 {
@@ -470,7 +473,7 @@ done:
     return out->cells != NULL;
 }
 
-/* ---- all cells of a grid --------------------------------------------------------------------------------------- */
+/* ---- summing over the listed cells ----------------------------------------------------------------------------- */
 
 static void add_linear_cell(target *to, int64_t cell, node_list *buffer)
 {
@@ -515,9 +518,9 @@ static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
                      to->basis->field_count, &row->nodes[n]);
 }
 
-/* Reads those nodes of a cell at which sums are computed, and the nodes from which the derivatives at these nodes
- * are computed. In finer lattices of which few pieces are made, these nodes are few. Returns whether all values are
- * finite. */
+/* Reads those nodes of a cell at which sums are computed, and the nodes from which the derivatives at these nodes are
+ * computed. If the cell is refined but only few of its linear pieces are made, these nodes are few. Returns whether all
+ * values are finite. */
 static bool read_summed_nodes(target *to, int64_t cell, const session_derivatives *d, node_list *row, int size)
 {
     const session_polynomials *p = to->basis->polynomials;
@@ -541,8 +544,8 @@ static bool read_all_nodes(target *to, int64_t cell, node_list *row, int size)
     return is_finite;
 }
 
-/* Adds the contributions of one of the caller's cells. If its derivatives are not known, or a value is not finite, its
- * pieces contribute as linear cells. */
+/* Adds the contributions of one of the caller's cells. If the derivatives of its polynomial are not implemented, or a
+ * value is not finite, its linear pieces contribute instead. */
 static void add_polynomial_cell(target *to, int64_t cell, node_list *row)
 {
     const session_polynomials *p = to->basis->polynomials;

@@ -24,10 +24,10 @@ typedef struct session_gradient_basis {
     const session_polynomials *polynomials;
 } session_gradient_basis;
 
-/* Returns the count of the numbers of which the sum over the cells around a vertex consists. Each number is stored as a
- * high and a low integer word, so that adding two sums word by word is exact and does not depend on the order. The high
- * words come first: three components for each scalar, then the weight, and padding to an even number. The low words
- * follow in the same order. */
+/* Returns how many numbers the sum at a vertex, over the cells around it, has. Each number is stored as a high and a
+ * low integer word, so that adding two sums word by word is exact and does not depend on the order. The high words come
+ * first: three components of the gradient for each scalar, then the weight, and padding to an even number. The low
+ * words follow in the same order. */
 static inline int session_count_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;

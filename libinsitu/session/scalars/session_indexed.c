@@ -150,7 +150,8 @@ static void read_node(const void *of, int64_t position, double *tuple)
     }
 }
 
-/* Returns an error for the first vertex or corner of the caller whose index is out of range. */
+/* Checks the entries of the field's index at all vertices or corners of the caller. Returns an error for the first
+ * entry that is out of range. */
 static insitu_status check_index(const session_mesh *mesh, const session_field *field, const indexed_values *v,
                                  base_error *error)
 {
@@ -163,7 +164,8 @@ static insitu_status check_index(const session_mesh *mesh, const session_field *
     return INSITU_OK;
 }
 
-/* Computes the values of the cells' polynomials at the nodes of finer lattices, in the copy. */
+/* Fills the field's copy with the values of the cells' polynomials at the nodes of finer lattices, which divide cells
+ * of higher order into more pieces than their own nodes do (session_finer.h). */
 static insitu_status interpolate_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
 {
     const indexed_values v = make_indexed_values(mesh, field);

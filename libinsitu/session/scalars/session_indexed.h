@@ -12,10 +12,10 @@ void session_mark_field_for_statistics(const session_meshes *meshes, const scene
 /* Removes all marks that session_mark_field_for_statistics() has set. Local. */
 void session_clear_requested_fields(const session_meshes *meshes);
 
-/* Both functions copy values into the order of the mesh by their index, unless the copy is up to date.
- * session_copy_requested_fields() copies the fields that statistics need, and clears their marks.
- * session_copy_used_fields() copies the fields of scalars in use, and the fields from which derived fields are
- * computed. Both functions must be called before the values are read. Local. */
+/* Both functions copy values that have an index into the order of the mesh's vertices, cells or corners, unless the
+ * copy is up to date. session_copy_requested_fields() copies the fields that statistics need, and clears their marks.
+ * session_copy_used_fields() copies the fields of scalars that this step uses, and the fields from which derived fields
+ * are computed. Both functions must be called before the values are read. Local. */
 insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error);
 

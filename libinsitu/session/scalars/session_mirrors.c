@@ -126,7 +126,8 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
     if (image) share_fields(meshes, image, error);
 }
 
-/* The catalogue does not change, because mirror images have the names of their source meshes and fields. */
+/* The catalogue, which lists the meshes and fields of all ranks, does not change, because mirror images have the names
+ * of their source meshes and fields. */
 void session_update_mirrors(const scene *scene, session_meshes *meshes, int threads, base_error *error)
 {
     const bool are_names_changed = meshes->are_names_changed;
@@ -141,8 +142,8 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */
 
-/* Number of bounds that are computed for each mirror: the bounds, over all ranks, of the meshes to which it applies, as
- * three minima and then three negated maxima. */
+/* Number of elements of a mirror's bounds. These are the bounds, over all ranks, of the meshes to which the mirror
+ * applies: three minima and then three negated maxima. */
 enum { ENDS = 6 };
 
 static void find_bounds_of_mirrored_meshes(const scene_mirror *mirror, const scene *scene, const session_meshes *meshes,

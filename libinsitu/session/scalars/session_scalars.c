@@ -28,8 +28,9 @@ static uint64_t find_mesh_group_name(const session_mesh *mesh, const scene_field
     return mesh->single_group_name ? mesh->single_group_name : field->mesh_group_name;
 }
 
-/* Returns the scalar of the mesh with these properties; NULL if there is none. mesh_group_name: hash that identifies
- * the mesh group over which a recentred scalar is averaged; ignored for other scalars. */
+/* Returns the scalar of the mesh with these properties; NULL if there is none. is_recentred: the scalar's values are
+ * averaged at vertices. mesh_group_name: hash that identifies the group of meshes over which they are averaged; ignored
+ * if is_recentred is false. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
                                    uint64_t mesh_group_name)
 {
@@ -190,7 +191,7 @@ int64_t session_count_unusable_cells(const session_mesh *mesh, const session_sca
     return count;
 }
 
-/* ---- ranges and extents -------------------------------------------------------------------------------------- */
+/* ---- minima and maxima of scalars ---------------------------------------------------------------------------- */
 
 mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)
 {

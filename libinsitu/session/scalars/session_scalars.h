@@ -34,7 +34,8 @@ grid_field session_get_caller_values(const session_mesh *mesh, int field, int co
  * and not from the caller's arrays. */
 bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
-/* Returns whether the field's copy contains the cells' polynomials evaluated at the nodes of finer lattices. */
+/* Returns whether the field's copy contains values of the cells' polynomials at the nodes of finer lattices, which
+ * divide cells of higher order into more pieces than their own nodes do (session_finer.h). */
 bool session_is_interpolated(const session_mesh *mesh, const session_field *field);
 
 /* Returns whether a copy contains the values in their own type. Otherwise it contains doubles: components in separate
@@ -61,11 +62,12 @@ grid_field session_get_scalar_values(const session_mesh *mesh, const session_sca
 /* Returns the number of the caller's drawn cells that have a value which is not finite. Local. */
 int64_t session_count_unusable_cells(const session_mesh *mesh, const session_scalar *scalar);
 
-/* Returns the ranges of a used scalar's values in the nodes of the tree. */
+/* Returns the minimum and maximum of the scalar's values in each node of the tree. The scalar must be used in this
+ * step. */
 mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
-/* Computes the minimum and maximum over the drawn cells all of whose values are finite; low > high if there are none.
- * kind: selects the cells that are included. Parallel. Local. */
+/* Computes the minimum and maximum of the scalar over those drawn cells all of whose values are finite; low > high if
+ * there are none. kind: selects among these cells. Parallel. Local. */
 void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                                 double *low, double *high);
 /* Marks the stored minima and maxima as unknown, because the values have changed. */

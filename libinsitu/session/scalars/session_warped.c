@@ -83,7 +83,7 @@ static session_displacement read_displacement(const scene_warp *warp, const sess
     return out;
 }
 
-/* ---- meshes ------------------------------------------------------------------------------------------------------ */
+/* ---- warping meshes ---------------------------------------------------------------------------------------------- */
 
 /* Moves the vertices by the field. A part without cells may lack the field. If the field has a fill function, it is
  * called on such a part too, because it may be collective. */

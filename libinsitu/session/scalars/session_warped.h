@@ -6,9 +6,9 @@
 #include "session_catalogue.h"
 #include "session_report.h"
 
-/* Moves the vertices of the meshes that the scene warps, if the mesh, the field or the scene has changed. Errors in
- * these fields are stored with the meshes; the check of the meshes, which must follow, returns them. scene_path is used
- * in messages. Local, but fill functions may communicate. */
+/* Moves the vertices of the meshes that the scene warps, if the mesh, the field of displacements or the scene has
+ * changed. Errors in these fields are stored with the meshes; the check of the meshes, which must follow, returns them.
+ * scene_path is used in messages. Local, but fill functions may communicate. */
 void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads);
 
 /* Warns if a mesh that the scene warps does not exist, and if gradients are computed on a warped mesh. Local. */
