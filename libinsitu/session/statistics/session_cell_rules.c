@@ -1,8 +1,9 @@
-/* Integrals over cells of higher order by Gauss points. A cell is straight if its map from the reference cell is linear
- * in each factor of the cell (a line, a triangle or a tet: a wedge is a triangle times a line, a hex is three lines);
- * other cells are bent. Let p be the order of a cell, J the Jacobian of its map, and f the polynomial of its values.
- * The volume is the integral of det J, and the standard deviation needs the integral of f^2 det J. The map of a bent
- * cell has the order p. Then f^2 det J is a polynomial of the following degrees, for which the rules are exact:
+/* Computes integrals over cells of higher order by Gauss quadrature. The reference cell is a product of factors: a hex
+ * is the product of three lines, and a wedge that of a triangle and a line; a tet is a single factor. A cell is called
+ * straight if the map from the reference cell to the cell is linear in each factor; other cells are called bent. Let p
+ * be the order of a cell, J the Jacobian of its map, and f the polynomial of its values. The volume is the integral of
+ * det J, and the standard deviation needs the integral of f^2 det J. The map of a bent cell has the order p. Then
+ * f^2 det J is a polynomial of the following degrees, for which the rules are exact:
  *
  *     factor                  straight   bent
  *     each line of a hex      2 p + 2    5 p - 1
@@ -10,11 +11,12 @@
  *     line of a wedge         2 p + 2    5 p - 1
  *     tet                     2 p        5 p - 3, at most 33
  *
- * Products of lines are summed factor by factor, so that all of their degrees are affordable: with p = 4 a bent hex has
- * 1000 points and takes some 50 multiplications for each of them. The functions of a tet are not products. With p = 7,
- * the highest order at which bent tets are integrated exactly, there are 4913 points, at each of which 120 nodes are
- * summed. For higher orders, straight tets are still integrated exactly. In bent tets a rule of degree 33 is used; for
- * analytic functions, the error of such rules decreases fast with their degree.
+ * Polynomials on a product of lines are evaluated along one line after the other (sum factorization), so that all of
+ * these degrees are affordable in hexes: with p = 4 a bent hex has 1000 points and takes some 50 multiplications for
+ * each of them. The functions of a tet are not products. With p = 7, the highest order at which bent tets are
+ * integrated exactly, there are 4913 points, at each of which 120 nodes are summed. For higher orders, straight tets
+ * are still integrated exactly. In bent tets a rule of degree 33 is used; for analytic functions, the error of such
+ * rules decreases fast with their degree.
  *
  * The area element of a shell is a square root, which no rule integrates exactly unless the shell is flat. Flat shells
  * need the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that degree, and
@@ -32,16 +34,17 @@
 enum {
     LANES = 4,  /* number of points whose sums are computed together */
     BLOCK = 32, /* maximum number of points in a block */
-    /* maximum number of doubles of session_rule_factor.functions; if a factor needs more, its functions are computed
-     * again for each cell */
+    /* maximum number of doubles of session_rule_factor.functions; if the nodal functions at all points take more, they
+     * are computed again for each cell */
     MOST_FUNCTIONS = 1 << 20,
-    MOST_TET_POINTS = 17, /* maximum number of points along an axis of bent tets; higher if straight tets need more */
+    MOST_TET_POINTS = 17, /* maximum number of points along an axis of bent tets, or the number that straight tets
+                             need, if it is larger */
     SIZE = 4,             /* number of doubles of a tuple: x, y, z and a value */
-    MOST_SIZE = SIZE + 6, /* number of doubles of a tuple and of the position's derivatives along two lines */
+    MOST_SIZE = SIZE + 6, /* number of doubles of a tuple together with the position's derivatives along two axes */
     AXES = 3
 };
 
-/* ---- numbers of points ----------------------------------------------------------------------------------------- */
+/* ---- numbers of quadrature points ------------------------------------------------------------------------------ */
 
 static int count_points_of_degree(int degree)
 {
@@ -65,7 +68,7 @@ static int count_line_points(const session_nodes *of, bool is_bent)
     return grid_is_shell_type(of->type) ? 4 * p : count_points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
 }
 
-/* ---- functions of nodes ---------------------------------------------------------------------------------------- */
+/* ---- nodal functions ------------------------------------------------------------------------------------------- */
 
 /* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. out[n * stride] receives
  * the value for node n, and out[n * stride + slopes] the derivative. */
@@ -117,7 +120,8 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
             }
 }
 
-/* Returns the number of doubles that the values and derivatives of a factor's functions at one block of points take. */
+/* Returns the number of doubles that the nodal functions of a factor (a line, triangle or tet) and their derivatives
+ * take at one block of quadrature points. */
 static size_t count_block_numbers(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
@@ -154,7 +158,7 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
     return out->functions;
 }
 
-/* ---- rules of a type and order of cells -------------------------------------------------------------------------- */
+/* ---- quadrature rules for one type and order of cells ------------------------------------------------------------ */
 
 static bool is_box(int type)
 {
@@ -234,17 +238,19 @@ void session_drop_cell_rules(session_cell_rules *rules)
     *rules = (session_cell_rules){.line_count = 0};
 }
 
-/* ---- one cell -------------------------------------------------------------------------------------------------- */
+/* ---- quadrature points of one cell ----------------------------------------------------------------------------- */
 
-/* The state while the points of one cell are visited. The polynomials are evaluated one factor after the other.
- * lattices[n] contains one array for each component, with the values at the nodes of the first factor times n lines.
- * Evaluating lattices[n] at a point of its last line gives lattices[n - 1]. The latter has three more components: the
- * derivatives of the position along that line. */
+/* The state while the quadrature points of one cell are visited. The reference cell is the product of a first factor (a
+ * line, triangle or tet) and of up to two further lines, and the polynomials are evaluated along one line after the
+ * other. lattices[n] contains one array for each component (x, y, z and the value), with its values at the nodes of the
+ * first factor times n lines. Evaluating lattices[n] at a quadrature point of its last line gives lattices[n - 1],
+ * which has three more components: the derivatives of the position along that line. */
 typedef struct cell_visit {
     const session_cell_rules *rules;
     const session_product_rule *rule;
     double *lattices[AXES]; /* for each n, the components at the nodes of the first factor times the first n lines */
-    double *functions;      /* memory for a block of functions that are not stored */
+    double *functions;      /* memory for the nodal functions at one block of points, if
+                               session_rule_factor.functions is NULL */
     session_visit_points *visit;
     void *of;
 } cell_visit;
@@ -304,7 +310,8 @@ static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
                        : cross[0] * s[2][0] + cross[1] * s[2][1] + cross[2] * s[2][2];
 }
 
-/* Visits one block of points of the first factor. weight: product of the weights of the points on the lines. */
+/* Passes one block of quadrature points of the first factor (a line, triangle or tet) to the visitor function. weight:
+ * product of the quadrature weights of the current points on the further lines. */
 static void visit_block(const cell_visit *v, int first, const double *functions, double weight)
 {
     const session_rule_factor *factor = &v->rule->first;
@@ -379,9 +386,9 @@ static void visit_points(const cell_visit *v)
     }
 }
 
-/* Returns whether the cell is straight: the positions of all nodes are linear functions of the corners' positions, up
- * to rounding. The integrand of any other cell has a higher degree, so that the tolerance must not exceed the rounding
- * error by much. */
+/* Returns whether the positions of all of the cell's nodes are linear functions of the corners' positions, up to
+ * rounding (the cell is straight). In any other cell the integrand has a higher degree, for which the rule of straight
+ * cells is not exact, so that the tolerance must not exceed the rounding error by much. */
 static bool is_straight(const session_cell_rules *rules, const double *tuples, const double *positions)
 {
     static const double tolerance = 1e-12;

@@ -19,7 +19,8 @@ typedef struct session_rule_factor {
     double *functions;
 } session_rule_factor;
 
-/* A product rule. The first factor is a line, a triangle or a tet; all further factors are lines. */
+/* A quadrature rule whose points are all combinations of a point of `first`, a rule on a line, a triangle or a tet, and
+ * of points of `line` along up to two further axes. */
 typedef struct session_product_rule {
     session_rule_factor first, line;
 } session_product_rule;
@@ -34,11 +35,12 @@ typedef struct session_cell_rules {
     /* for pyramids, the matrix that computes values at the nodes of `lattice` from values at nodes.complete; otherwise
      * NULL */
     double *collapse;
-    int line_count; /* number of factors that are lines, not counting the first one */
+    int line_count; /* number of lines by which the line, triangle or tet of straight.first and bent.first is
+                       multiplied to give the reference cell: 0 .. 2 */
     int corner_count;
     double *corner_weights; /* values of the corners' linear functions at all nodes: a matrix of nodes x corners */
-    /* straight: rules of cells whose positions are linear in each factor; bent: rules of other cells. Shells and
-     * pyramids have only the rules `bent`. */
+    /* straight: rules for cells whose map from the reference cell is linear in each factor (line, triangle or tet) of
+     * the reference cell; bent: rules for all other cells. Shells and pyramids have only the rules `bent`. */
     session_product_rule straight, bent;
 } session_cell_rules;
 

@@ -20,14 +20,16 @@
 #include "session_scalars.h"
 #include "session_tally.h"
 
-/* A pass over the cells of a mesh: computes their values or, if `binned` is given, the volumes in bins. */
+/* A pass over the cells of a mesh: computes their values or, if `binned` is given, the volumes that they have in the
+ * bins of a histogram. */
 typedef struct order_pass {
     const session_order_field *of;
     const session_binned_volumes *binned;
     const session_cell_value *cells; /* the values of all cells, if `binned` is given */
     session_cell_value *out;         /* receives the values of all cells, if `binned` is NULL */
     session_rows rows;               /* access to each cell's list of the caller's nodes */
-    /* access to each cell's list of the nodes whose values are read; these may be nodes of finer lattices */
+    /* access to each cell's list of the nodes whose values are read. In refined cells these are the nodes of a finer
+     * lattice (session_finer.h), which include the cell's own nodes. */
     session_rows lattice;
     const session_node_values *values; /* the caller's values at nodes; NULL: of->values is read */
     session_cell_rules rules[ROWS_MOST_KINDS];
@@ -64,7 +66,8 @@ static void read_caller_values(const order_pass *p, int64_t cell, int count, dou
     }
 }
 
-/* Reads the values at those nodes of the finer lattice that are the cell's own nodes. */
+/* Reads the values at a cell's own nodes, if the vertices of the session's mesh are the nodes of a finer lattice in the
+ * cell. Every step-th node of this lattice is a node of the cell. */
 static void read_lattice_values(const order_pass *p, const session_interpolation *nodes, int64_t cell, double *out)
 {
     const session_nodes *of = &nodes->complete;
@@ -133,8 +136,8 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
     return session_read_cell_value(&one, &field, 0, &buffer->volume);
 }
 
-/* Returns whether integrals over the cell are computed as sums over its linear pieces. Such cells are never refined
- * (session_finer.c). */
+/* Returns whether integrals over the cell are computed as sums over its linear pieces, because its nodal functions are
+ * not implemented. Such cells are never refined (session_finer.c). */
 static bool is_summed(const session_nodes *nodes)
 {
     return nodes->type == GRID_PYRAMID && nodes->order > INTERPOLATION_MOST_PYRAMID;
@@ -165,7 +168,7 @@ static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_bu
     return out;
 }
 
-/* ---- polynomials ------------------------------------------------------------------------------------------------- */
+/* ---- integrals of polynomials ------------------------------------------------------------------------------------ */
 
 /* A cell is treated as flat if its volume is at most this fraction of the volume of its bounding box. The fraction
  * covers rounding errors of products of derivatives, each of which is a sum over the nodes. */
@@ -257,14 +260,15 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
     return integrate_cell(p, &p->rules[kind], cell, buffer);
 }
 
-/* ---- bins -------------------------------------------------------------------------------------------------------- */
+/* ---- volumes in the bins of a histogram -------------------------------------------------------------------------- */
 
-/* The volumes of one cell in bins. */
+/* The parts of one cell's volume in which the value lies in each bin of a histogram. */
 typedef struct cell_bins {
     const session_binned_volumes *binned;
     /* range of the values at the cell's nodes; scaled values are 0 at the minimum and 1 at the maximum */
     double minimum, maximum;
-    double total;                     /* signed volume of the whole cell, including values outside of all bins */
+    double total;                     /* signed volume of the whole cell, including the parts whose values lie
+                                         outside of all bins */
     double volumes[SESSION_MAX_BINS]; /* signed volume in each bin */
 } cell_bins;
 
@@ -310,7 +314,7 @@ static void bin_cell(const order_pass *p, int64_t cell, order_buffer *buffer, in
         if (own.volumes[bin] != 0) add_fixed_point(sums + (ptrdiff_t)2 * bin, own.volumes[bin] * scale);
 }
 
-/* ---- all cells --------------------------------------------------------------------------------------------------- */
+/* ---- passes over all cells --------------------------------------------------------------------------------------- */
 
 static bool begin_pass(order_pass *p)
 {

@@ -19,11 +19,11 @@
 #include "session_region.h"
 #include "session_scalars.h"
 
-/* ---- sums ---------------------------------------------------------------------------------------------------- */
+/* ---- sums over the cells of one mesh ------------------------------------------------------------------------- */
 
-/* Indices of the first pass's sums in their array. Entry 0 is the number of cells. The other sums have two words each:
- * VOLUME: of volumes; MOMENT: of volumes times positions of the values in their range; BINS: of the volumes in each bin
- * of the histogram. */
+/* Indices of the sums of the first pass in their array. Entry 0 is the number of cells. All other sums have two words
+ * each. VOLUME: sum of the volumes; MOMENT: sum of the volumes times the positions (0 to 1) of the cells' values in the
+ * range of all values; BINS: for each bin of the histogram, the sum of the volumes in the bin. */
 enum { VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
 /* Results of earlier passes that a pass over the cells needs. */
@@ -131,7 +131,7 @@ static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
     }
 }
 
-/* ---- passes -------------------------------------------------------------------------------------------------- */
+/* ---- passes over all meshes ---------------------------------------------------------------------------------- */
 
 typedef struct statistics_work {
     const session_meshes *meshes;
@@ -142,8 +142,8 @@ typedef struct statistics_work {
     /* for each request and mesh, the values of the caller's cells if the mesh has cells of higher order; otherwise
      * NULL */
     session_cell_value **order_values;
-    /* KINDS * ENDS entries per request. The last entry of the array is -1 if memory ran out on a rank, and otherwise
-     * 0 */
+    /* KINDS * ENDS entries per request, in the order that is described at KINDS. The last entry of the array is -1 if
+     * memory ran out on a rank, and otherwise 0 */
     double *extremes;
     int64_t *sums; /* MAX_SUMS entries per request. The entry after the sums of all requests is the number of ranks on
                       which memory ran out */
@@ -307,8 +307,8 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
     return status;
 }
 
-/* Finds the meshes in which nodes of cells of higher order are Gauss-Lobatto points, by the same rule as for finer
- * lattices (session_finer.h). Collective. */
+/* Finds the meshes in which nodes of cells of higher order are Gauss-Lobatto points, by the rule of
+ * session_count_higher_order_cells() (session_finer.h). Collective. */
 static insitu_status find_spacings(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
                                    bool *are_lobatto, base_error *error)
 {

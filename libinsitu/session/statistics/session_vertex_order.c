@@ -25,8 +25,8 @@ static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD
 enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 /* Indices of the counts for one mesh: drawn cells that are not shells, those of them that have no volume, left-handed
- * cells, shells, parts with cells of higher order, parts with bent cells, and then TYPE_SUMS counts for each type of
- * cell. */
+ * cells, shells, parts with cells of higher order, parts with bent cells (cells of higher order that differ in shape
+ * from the linear cell with the same corners), and then TYPE_SUMS counts for each type of cell. */
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, BENT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
 /* Returns whether all corner volumes of the cell would have the same sign if `order` were the mesh's vertex_order. */
@@ -45,8 +45,9 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     return !tally_has_both_signs(type, points);
 }
 
-/* Returns the counts of the cell's type. Returns NULL if the cell is not counted, because its type has only one order,
- * because it is a ghost, or because the caller gave it as a polyhedron, whose faces determine the order. */
+/* Returns the counts for cells of this cell's type. Returns NULL if the cell is not counted, because its type has only
+ * one vertex order, because it is a ghost, or because the caller gave it as a polyhedron, whose faces determine the
+ * order. */
 static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -119,8 +120,8 @@ static int find_fitting_order(const int64_t sums[CELL_SUMS])
     return best;
 }
 
-/* Warns if, for some type, most sampled cells have corner volumes of both signs, and names the order that fits most
- * cells, if there is one. Returns whether this is the case for some type. */
+/* Warns if most sampled cells of some type have corner volumes of both signs. The warning names the vertex order with
+ * which most cells have a single sign, if there is one. Returns whether a warning was due. */
 static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};

@@ -37,8 +37,8 @@ static double tet_volume(double (*p)[3])
     return determinant3(u, v, w) / 6;
 }
 
-/* Returns, for each of the eight corners of a hex, the index of the cell's corner that takes its place. A wedge or
- * pyramid is thereby read as a hex with coincident corners. */
+/* Returns an array that contains, for each of the eight corners of a hex, the index of the cell's corner that takes its
+ * place. A wedge or pyramid is thereby read as a hex with coincident corners. */
 static const signed char *find_corners_as_hex(int type)
 {
     static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},

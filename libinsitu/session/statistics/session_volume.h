@@ -10,7 +10,8 @@
 typedef struct volume_buffer {
     const int64_t *vertices; /* vertices, without duplicates, of the cell whose volume was computed most recently */
     int vertex_count;
-    int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
+    int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells whose type has a fixed number of
+                                                vertices */
     char *bytes;                             /* memory for polyhedra and polygons */
     /* size: size of `bytes`; requested_size: number of bytes that were requested most recently */
     size_t size, requested_size;
