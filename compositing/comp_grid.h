@@ -83,10 +83,10 @@ static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
 }
 
 /* Returns the pixel of the picture that has this index in the strip. */
-static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, uint32_t at)
+static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, uint32_t index_in_strip)
 {
     const uint32_t x = strip % grid->strips_per_row * COMP_LANES, y = strip / grid->strips_per_row << grid->row_shift;
-    return (y + at / COMP_LANES) * grid->width + x + at % COMP_LANES;
+    return (y + index_in_strip / COMP_LANES) * grid->width + x + index_in_strip % COMP_LANES;
 }
 
 /* ---- owners of blocks ------------------------------------------------------------------------------------------- */

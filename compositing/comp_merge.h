@@ -5,7 +5,7 @@
 
 #include "fragment.h"
 
-typedef void comp_interval_callback(void *state, const fragment *stretch);
+typedef void comp_interval_callback(void *state, const fragment *interval);
 
 /* Calls the callback for each interval that comp_merge_pixel() blends, front to back. Overlapping intervals are split
  * at all of their starts and ends, and each of the resulting shorter intervals is passed as the mixture of the

@@ -61,14 +61,14 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
 }
 
 /* Packs this rank's fragments for one owner, in a part of the strips that contain such fragments. These strips are
- * divided into `shares` parts of about equal length; `share` is the index of the part. Returns false if memory ran
- * out. */
-static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
+ * divided into `part_count` parts of about equal length; `part_index` is the index of the part. Returns false if memory
+ * ran out. */
+static bool pack_owner(const owner_strips *c, uint32_t owner, int part_index, int part_count, comp_layers *layers,
                        comp_writer *writer)
 {
     const uint32_t begin = c->starts[owner], count = c->starts[owner + 1] - begin;
-    const uint32_t first = begin + (uint32_t)((uint64_t)count * (uint32_t)share / (uint32_t)shares);
-    const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)share + 1) / (uint32_t)shares);
+    const uint32_t first = begin + (uint32_t)((uint64_t)count * (uint32_t)part_index / (uint32_t)part_count);
+    const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)part_index + 1) / (uint32_t)part_count);
     packing p = {writer, owner, 0};
     bool is_ok = true;
     for (uint32_t i = first; i < end; i++) p.remaining += comp_strips_count(c->strips, c->order[i]);
@@ -81,17 +81,17 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
  * its first digit. A place is the number of a rank on the route, written with one digit per round (comp_route.h). One
  * partner of the first round gets these fragments; if `digit` is the first digit of this rank's own place, they are
  * kept for later rounds. Fragments that this rank owns itself are not packed. The strips of each owner are divided into
- * `shares` parts; `share` is the index of the part. */
+ * `part_count` parts; `part_index` is the index of the part. */
 typedef struct batch {
     int digit, radix, place;
-    int share, shares;
+    int part_index, part_count;
 } batch;
 
 static bool pack_batch(const owner_strips *c, int owners, const batch *b, comp_layers *layers, comp_writer *writer)
 {
     bool is_ok = true;
     for (int owner = b->digit; owner < owners && is_ok; owner += b->radix)
-        is_ok = owner == b->place || pack_owner(c, (uint32_t)owner, b->share, b->shares, layers, writer);
+        is_ok = owner == b->place || pack_owner(c, (uint32_t)owner, b->part_index, b->part_count, layers, writer);
     return is_ok;
 }
 
@@ -100,7 +100,7 @@ static bool pack_all(const owner_strips *c, const comp_route *route, int place, 
     const int radix = route->round_count ? route->radix[0] : 1, threads = c->strips->grid->threads;
     const bool is_beyond = place >= route->owners;
     const int own = is_beyond ? -1 : comp_route_digit(route, 0, 1, place);
-    const int shares = (threads + radix - 1) / radix;
+    const int part_count = (threads + radix - 1) / radix;
     bool is_ok = true;
 #pragma omp parallel num_threads(threads) reduction(&& : is_ok)
     {
@@ -108,9 +108,9 @@ static bool pack_all(const owner_strips *c, const comp_route *route, int place, 
         comp_layers *const layers = base_calloc(1, sizeof *layers);
         is_ok = layers != NULL;
 #pragma omp for schedule(dynamic, 1)
-        for (int i = 0; i < radix * shares; i++) {
-            const int digit = is_beyond ? i / shares : (own + i / shares) % radix;
-            const batch b = {digit, radix, place, i % shares, shares};
+        for (int i = 0; i < radix * part_count; i++) {
+            const int digit = is_beyond ? i / part_count : (own + i / part_count) % radix;
+            const batch b = {digit, radix, place, i % part_count, part_count};
             comp_writer writer = {.rank = comp_route_rank(route, is_beyond
                                                                      ? place - route->owners
                                                                      : comp_route_partner(route, 0, 1, place, digit))};

@@ -183,11 +183,11 @@ static bool are_coincident(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* The corners `again` and `tip` have the same position. Returns whether one of the two edges at `again` leads into the
- * angle between the two edges from `tip` to its neighbours a and c. */
-static bool does_edge_enter_corner(const polygon_work *w, int a, int tip, int c, int again)
+/* The corners `coincident` and `tip` have the same position. Returns whether one of the two edges at `coincident` leads
+ * into the angle between the two edges from `tip` to its neighbours a and c. */
+static bool does_edge_enter_corner(const polygon_work *w, int a, int tip, int c, int coincident)
 {
-    const int ends[2] = {w->previous[again], w->next[again]};
+    const int ends[2] = {w->previous[coincident], w->next[coincident]};
     for (int i = 0; i < 2; i++)
         if (compute_triangle_area(w, a, tip, ends[i]) > line_slack &&
             compute_triangle_area(w, tip, c, ends[i]) > line_slack)
@@ -195,12 +195,13 @@ static bool does_edge_enter_corner(const polygon_work *w, int a, int tip, int c,
     return false;
 }
 
-static bool is_ear_blocked_by_corner(const polygon_work *w, int a, int tip, int c, int by)
+static bool is_ear_blocked_by_corner(const polygon_work *w, int a, int tip, int c, int other)
 {
-    if (are_coincident(w, by, a) || are_coincident(w, by, c)) return false;
-    if (are_coincident(w, by, tip)) return does_edge_enter_corner(w, a, tip, c, by);
-    return compute_triangle_area(w, a, tip, by) >= -line_slack && compute_triangle_area(w, tip, c, by) >= -line_slack &&
-           compute_triangle_area(w, c, a, by) >= -line_slack;
+    if (are_coincident(w, other, a) || are_coincident(w, other, c)) return false;
+    if (are_coincident(w, other, tip)) return does_edge_enter_corner(w, a, tip, c, other);
+    return compute_triangle_area(w, a, tip, other) >= -line_slack &&
+           compute_triangle_area(w, tip, c, other) >= -line_slack &&
+           compute_triangle_area(w, c, a, other) >= -line_slack;
 }
 
 static int find_blocker(const polygon_work *w, int tip)

@@ -10,9 +10,9 @@
 
 enum { FIXED_LOW_BITS = 28, SESSION_MAX_BINS = 256 };
 
-static inline void add_fixed_point(int64_t sum[2], double share)
+static inline void add_fixed_point(int64_t sum[2], double fraction)
 {
-    const int64_t whole = llrint(share * 0x1p52);
+    const int64_t whole = llrint(fraction * 0x1p52);
     sum[0] += whole >> FIXED_LOW_BITS;
     sum[1] += whole & ((1 << FIXED_LOW_BITS) - 1);
 }

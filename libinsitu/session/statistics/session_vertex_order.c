@@ -57,11 +57,11 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-/* Adds the counts of a sample of the part's cells. share: number of this rank's parts of the mesh, among which the
+/* Adds the counts of a sample of the part's cells. part_count: number of this rank's parts of the mesh, among which the
  * samples are divided; each part gets at least one sample. */
-static void count_fitting_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
+static void count_fitting_orders(const session_mesh *mesh, int part_count, int64_t sums[CELL_SUMS])
 {
-    const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
+    const int64_t samples = (SAMPLES + part_count - 1) / part_count, step = mesh->cells.cell_count / samples + 1;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
         const int type = grid_cell_type(&mesh->cells, cell);
         int64_t *of_type = find_type_sums(mesh, cell, sums);
