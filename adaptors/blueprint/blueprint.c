@@ -17,8 +17,9 @@ typedef struct known_mesh {
     int64_t number;      /* number of the block, or WHOLE_MESH */
     int64_t step_number; /* value of the step counter when the mesh was last set */
     uint64_t name_hash, coordinate_hash, cell_hash, fields_hash;
-    insitu_mesh mesh;       /* description that was passed to the session; the pointer mesh.lattice is not valid */
-    insitu_lattice lattice; /* description that was passed to the session, if the mesh is a uniform block */
+    insitu_mesh mesh; /* description that was passed to the session; mesh.lattice is invalid until it is set to &lattice
+                         again */
+    insitu_lattice lattice; /* grid that was passed to the session; used only for uniform blocks */
     uniform_block uniform;
     owned_arrays owned;
 } known_mesh;
@@ -31,23 +32,25 @@ struct insitu_blueprint {
     known_mesh *known_meshes;
     int next_search;       /* index in known_meshes at which the next search begins */
     int64_t step_number;   /* step counter: the number of steps so far */
-    bool has_pending_sets; /* true if something has been set for the next step */
+    bool has_pending_sets; /* true if insitu_blueprint_set() has been called since the last step */
     node_log log;          /* errors and reports of the calls since the last step */
     bool has_cycle; /* true if a domain that was set for the next step states state/cycle; `cycle` is then the largest
                        such value */
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
-    /* the input of the last call of named_lattices_agree(): for each mesh, the lattice of this rank's blocks */
+    /* for each mesh with uniform blocks on this rank: common origin and spacings of these blocks, as they were when the
+     * ranks last agreed on those of all blocks */
     named_lattices lattices;
-    named_lattices common; /* for each mesh in `lattices`, the lattice of the blocks of all ranks */
+    named_lattices common; /* for each mesh in `lattices`: the common origin and spacings of the blocks of all ranks, on
+                              which the ranks agreed */
     insitu_blueprint_report report;
     char error[NODE_MESSAGE + 64];
 };
 
 static _Thread_local char create_error[256];
 
-/* ---- known meshes ----------------------------------------------------------------------------------------------- */
+/* ---- meshes that were passed to the session --------------------------------------------------------------------- */
 
 /* Finds a known mesh by its name and number. The search begins after the mesh that was found most recently, because
  * domains are set in the same order every step, and there may be thousands of them. */
@@ -122,7 +125,7 @@ static void remove_known_mesh(insitu_blueprint *adaptor, int index)
     *known = adaptor->known_meshes[--adaptor->known_count];
 }
 
-/* ---- one topology ----------------------------------------------------------------------------------------------- */
+/* ---- set a topology --------------------------------------------------------------------------------------------- */
 
 /* Reads state/insitu_changed, in which the domain may state what has changed. Returns false if the domain does not
  * state it; the caller must then compare hashes. */
@@ -173,9 +176,9 @@ static void reuse_owned_arrays(blueprint_mesh *mesh, known_mesh *known)
     known->owned = made;
 }
 
-/* Passes the mesh to the session. The known mesh takes over the arrays that the adaptor allocated. A uniform block is
- * placed on the lattice on which the ranks agreed in the last step; the ranks usually agree on the same lattice in the
- * next step. */
+/* Passes the mesh to the session. *known takes over the arrays that the adaptor allocated. The origin, first index and
+ * refinement of a uniform block are computed from the common lattice on which the ranks agreed in an earlier step. This
+ * lattice rarely changes; if it does, place_blocks() corrects the block. */
 static insitu_status set_known_mesh(insitu_blueprint *adaptor, blueprint_mesh *mesh, known_mesh *known)
 {
     const mesh_target target = target_of(adaptor, known);
@@ -243,7 +246,7 @@ static bool set_topology(insitu_blueprint *adaptor, const node *domain, const no
     return is_read;
 }
 
-/* ---- domains ---------------------------------------------------------------------------------------------------- */
+/* ---- set all topologies of a domain ----------------------------------------------------------------------------- */
 
 static bool read_state(insitu_blueprint *adaptor, const node *domain)
 {
@@ -367,7 +370,8 @@ static void remove_meshes_not_set(insitu_blueprint *adaptor)
         if (adaptor->known_meshes[i].step_number != adaptor->step_number) remove_known_mesh(adaptor, i);
 }
 
-/* Lists the lattices of this rank's uniform blocks. If memory runs out, stores this as the step's error. */
+/* Lists, for each mesh with uniform blocks on this rank, the common origin and spacings of these blocks. If memory runs
+ * out, stores this as the step's error. */
 static named_lattices list_lattices(insitu_blueprint *adaptor)
 {
     named_lattices list = {NULL, 0};
@@ -381,8 +385,8 @@ static named_lattices list_lattices(insitu_blueprint *adaptor)
     return list;
 }
 
-/* Makes the ranks agree on the lattices of their blocks. `list` contains this rank's lattices; the adaptor takes
- * ownership of it. Collective. */
+/* Makes the ranks agree on the common origin and spacings of each mesh's uniform blocks. `list` contains those of this
+ * rank's blocks. If the function succeeds, the adaptor takes ownership of `list`. Collective. */
 static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices *list)
 {
     named_lattices common;
@@ -405,7 +409,8 @@ static bool is_same_lattice_position(const insitu_lattice *a, const insitu_latti
     return is_same;
 }
 
-/* Passes uniform blocks to the session again if their common lattice has changed since the last step. */
+/* Passes a uniform block to the session again if its origin, first index or refinement has changed, because the ranks
+ * have agreed on another common lattice since the block was passed. */
 static void place_blocks(insitu_blueprint *adaptor)
 {
     for (int i = 0; i < adaptor->known_count; i++) {
@@ -436,7 +441,7 @@ static void finish_report(insitu_blueprint *adaptor)
     adaptor->report.bytes_copied = adaptor->log.bytes_copied;
 }
 
-/* Agrees with all ranks on errors, on the state and on the lattices of blocks. */
+/* Agrees with all ranks on errors, on the cycle and time, and on the common lattices of uniform blocks. Collective. */
 static insitu_status agree_on_step(insitu_blueprint *adaptor)
 {
     int failed_rank;

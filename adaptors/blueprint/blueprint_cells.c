@@ -52,10 +52,10 @@ static bool require_integers(const node *parent, const char *path, node_array *o
     return find_integers(parent, path, out);
 }
 
-/* ---- cells and faces of different sizes ------------------------------------------------------------------------- */
+/* ---- cells and faces with different numbers of vertices --------------------------------------------------------- */
 
-/* For each cell or face, the list of its vertices; or for each polyhedron, the list of its faces. `connectivity`
- * contains these lists one after the other. */
+/* Lists that are stored one after the other in `connectivity`: the vertices of each cell or face, or the faces of each
+ * polyhedron. */
 typedef struct row_list {
     node_array connectivity, sizes, offsets;
     int64_t count; /* number of lists in connectivity */
@@ -101,7 +101,8 @@ static bool check_offsets(const node *of, const row_list *rows)
     return true;
 }
 
-/* Reads lists of different lengths from a node `elements` or `subelements`. */
+/* Reads the lists of a node `elements` or `subelements`, with their sizes and offsets. rows->vertices must be set;
+ * sizes are then required only if it is 0. */
 static bool read_rows(const node *of, row_list *rows, owned_arrays *owned)
 {
     if (!require_integers(of, "connectivity", &rows->connectivity)) return false;
@@ -138,7 +139,8 @@ static bool read_faces(const node *topology, blueprint_mesh *out)
 
 /* ---- cells of several types ------------------------------------------------------------------------------------- */
 
-/* Reads the map from shape numbers to cell types. *are_vtk is set to true if all numbers are VTK's cell types. */
+/* Reads the map from shape numbers to cell types. *are_vtk is set to true if every shape number equals VTK's number of
+ * the cell type. */
 static bool read_map(const node *elements, blueprint_mesh *out, bool *are_vtk)
 {
     node map;
@@ -164,7 +166,8 @@ static bool read_map(const node *elements, blueprint_mesh *out, bool *are_vtk)
     return true;
 }
 
-/* Checks that the map contains every cell's number. A topology that contains points or lines is left out. */
+/* Checks that the map from shape numbers to cell types contains the number of every cell. Topologies with points or
+ * lines are left out. *has_polyhedra is set to true if a cell is a polyhedron. */
 static bool check_shape_numbers(const node *elements, const node_array *numbers, blueprint_mesh *out,
                                 bool *has_polyhedra)
 {

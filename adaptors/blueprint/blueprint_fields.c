@@ -19,7 +19,7 @@ typedef struct blueprint_field {
  * layer of ghost cells has at least one of VTK_LAYER_BITS. */
 enum { VTK_HIDDEN_BITS = 1 | 8 | 32, VTK_LAYER_BITS = 1 | 32 };
 
-/* ---- which fields ----------------------------------------------------------------------------------------------- */
+/* ---- fields of a topology --------------------------------------------------------------------------------------- */
 
 /* Checks whether state/metadata/vtk_fields declares the field as ghost flags. */
 static bool is_declared_ghosts(const node *domain, const char *name)
@@ -92,7 +92,7 @@ static bool next_field(field_walk *w)
 
 /* ---- strides of lattices ---------------------------------------------------------------------------------------- */
 
-/* Returns the number of cells or vertices along each axis, at least 1. */
+/* Computes the number of cells (if is_element) or vertices along each axis of the lattice; it is at least 1. */
 static void get_element_counts(const blueprint_mesh *mesh, bool is_element, int64_t counts[3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -123,7 +123,8 @@ static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
     return !field->field_node.log->status;
 }
 
-/* Checks whether the strides are equal along all axes with more than one element. */
+/* Checks whether the strides a and b are equal along each axis that has more than one element (counts[axis] > 1). A
+ * stride along another axis is never used. */
 static bool have_same_strides(const int64_t counts[3], const int64_t a[3], const int64_t b[3])
 {
     bool is_same = true;
@@ -152,7 +153,7 @@ static void set_cell_strides(blueprint_mesh *mesh, const blueprint_field *field)
     mesh->has_cell_strides = true;
 }
 
-/* ---- arrays ----------------------------------------------------------------------------------------------------- */
+/* ---- arrays of components --------------------------------------------------------------------------------------- */
 
 /* Stores in *out the array of one component of the field, beginning with the mesh's first vertex or cell. */
 static bool read_component(const node *values, const blueprint_mesh *mesh, const blueprint_field *field,
@@ -171,7 +172,7 @@ static bool read_component(const node *values, const blueprint_mesh *mesh, const
     return true;
 }
 
-/* ---- ghosts ----------------------------------------------------------------------------------------------------- */
+/* ---- ghost flags ------------------------------------------------------------------------------------------------ */
 
 /* Returns new flags of the mesh's cells, owned by the adaptor: 1 if the cell's entry in `flags` has a bit of the mask,
  * otherwise 0. Returns NULL if memory ran out. */
@@ -219,10 +220,10 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
     for (int axis = 0; axis < 3 && end[0] == 0; axis++) first[axis] = end[axis] = counts[axis];
 }
 
-/* Returns the bitwise or of the cells' flags. If the block has a level of refinement, the lattice's interior is first
- * reduced so that it excludes the ghost layers, which are the cells whose flags have a bit of the mask. Only flags in
- * the interior are then read. The reason is that a block hides the coarser cells below its interior, but must not hide
- * those below its ghost layers. */
+/* Returns the bitwise or of the flags of all cells, or, if the block has a level of refinement, of the cells in its
+ * interior. In the second case, first excludes the ghost layers from the interior: these are the cells whose flags have
+ * a bit of the mask. The block hides the coarser cells that its interior covers, and must not hide those that only its
+ * ghost layers cover. */
 static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
 {
     insitu_lattice *l = &mesh->lattice;
@@ -259,8 +260,8 @@ static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
     return true;
 }
 
-/* Reads the range of cells of a window, as indices in the domain. *fits is set to whether the range lies in the
- * domain. */
+/* Reads a window of a nestset, which is the range of this domain's cells that another domain covers: the cells first[]
+ * to end[] - 1 along each axis. *fits is set to whether this range lies in the domain. */
 static bool read_window(const node *window, const blueprint_mesh *mesh, int64_t first[3], int64_t end[3], bool *fits)
 {
     static const char *const origins[3] = {"origin/i", "origin/j", "origin/k"};
@@ -286,8 +287,9 @@ static void flag_cells(const int64_t strides[3], const int64_t first[3], const i
             for (int64_t i = first[0]; i < end[0]; i++) flags[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
 }
 
-/* Sets the ghost flags of the cells that finer domains cover, according to the windows of the nestset. Some codes write
- * windows in vertices, or in indices of another level; windows that do not fit the domain are left out. */
+/* Sets the ghost flags of the cells that finer domains cover, according to the windows of the nestset. Windows that do
+ * not fit the domain are left out, because some codes write windows as ranges of vertices, or in the indices of another
+ * level. */
 static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
 {
     node windows, window;
@@ -343,7 +345,7 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
     return !domain->log->status && read_nestsets(domain, topology, mesh);
 }
 
-/* ---- values ----------------------------------------------------------------------------------------------------- */
+/* ---- values of fields ------------------------------------------------------------------------------------------- */
 
 /* Returns a new list of the arrays of the field's components; the caller must free the list. Returns NULL on an
  * error. */

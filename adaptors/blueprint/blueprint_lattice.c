@@ -4,8 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Largest difference between positions that are treated as equal, as a fraction of a spacing. Rounding errors of
- * positions are far smaller, unless the lattice is too fine for the precision of its coordinates. */
+/* Two positions are treated as equal if they differ by at most this fraction of the spacing, and two spacings or ratios
+ * of spacings if their relative difference is at most this number. Rounding errors are far smaller, unless the spacing
+ * is close to the precision of the coordinates. */
 static const double tolerance = 1e-6;
 
 /* Largest values that insitu_lattice allows for blocks with levels of refinement. */
@@ -21,7 +22,7 @@ uniform_block uniform_block_of(const blueprint_mesh *mesh)
     return out;
 }
 
-/* ---- common lattices -------------------------------------------------------------------------------------------- */
+/* ---- common origin and spacings of blocks ----------------------------------------------------------------------- */
 
 static bool is_same_spacing(double a, double b)
 {
@@ -59,7 +60,7 @@ static common_lattice make_lattice_of_block(const uniform_block *block)
     return out;
 }
 
-/* ---- lists of common lattices ----------------------------------------------------------------------------------- */
+/* ---- lists of common lattices, one per mesh --------------------------------------------------------------------- */
 
 /* Finds the item of a mesh. The blocks of a mesh are added one after the other, so the search begins with the last item
  * of the list. */
@@ -169,10 +170,11 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
     return is_done;
 }
 
-/* ---- a block in its lattice ------------------------------------------------------------------------------------- */
+/* ---- position of a block in the common lattice ------------------------------------------------------------------ */
 
-/* Moves the block's origin along an axis to the common origin. If a block states its first index, its origin must
- * already equal the common origin, except for rounding. Returns false if the block does not lie on the lattice. */
+/* Moves the block's origin along an axis to the common origin, and its first index accordingly. If a block states its
+ * first index, its origin must already equal the common origin, except for rounding. Returns false if the block's
+ * vertices are not vertices of the common lattice. */
 static bool move_axis_to_common_origin(const uniform_block *block, const common_lattice *common, int axis,
                                        insitu_lattice *out)
 {

@@ -135,9 +135,10 @@ static bool read_explicit(const node *coordset, blueprint_mesh *out)
     return true;
 }
 
-/* ---- structured ------------------------------------------------------------------------------------------------- */
+/* ---- structured topologies -------------------------------------------------------------------------------------- */
 
-/* Reads the number of vertices along each axis, and the offsets and strides of the vertices if they are not packed. */
+/* Reads the number of vertices along each axis, and the offsets and strides of the vertices in the coordinate arrays.
+ * Missing strides are those of arrays without padding. */
 static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3], int64_t strides[3])
 {
     static const char *const dims[3] = {"elements/dims/i", "elements/dims/j", "elements/dims/k"};

@@ -90,7 +90,8 @@ static bool find_scene(const node *root, const char **scene, bool *is_text)
                                     "there is no scene: give insitu/scene, a *.yaml among scripts, or INSITU_SCENE");
 }
 
-/* Stores the names in catalyst/insitu/parameters, with the values to return if the scene lacks these parameters. */
+/* Reads catalyst/insitu/parameters: the names of the scene's parameters whose values the simulation requests, each with
+ * the value to return if the scene lacks the parameter. */
 static bool find_parameters(const node *root)
 {
     node all, one;

@@ -37,7 +37,8 @@ double srgb_from_linear(double linear)
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-/* Returns the nearest code of a value in [0, 1]; NaN becomes 0. */
+/* Returns the integer that best represents a value in [0, 1] if the largest integer of the type `code` represents 1.
+ * NaN becomes 0. */
 template <typename code> code quantize_to_code(double value)
 {
     const double largest = static_cast<double>(static_cast<code>(~code{0}));
@@ -80,7 +81,7 @@ class srgb_codes
   private:
     static constexpr int CODES = 256, BINS = 4096;
 
-    /* Returns the smallest linear value that has this code, found by bisection down to adjacent doubles. */
+    /* Returns the smallest linear value that becomes this sRGB code, found by bisection down to adjacent doubles. */
     static double find_smallest_value_of_code(int code)
     {
         double below = 0, least = 1;

@@ -1,6 +1,7 @@
-/* Decorations are placed one after the other. The first blocks are the areas that other pictures cover, because these
- * cannot move. Then text at the top and the bottom is placed, because it depends most on the borders. Colour bars share
- * the remaining height of their side. Every other block gets the free position nearest to its anchor. Candidate
+/* Decorations are placed one after the other, each in a rectangle (block) of its own. The first blocks are the areas
+ * that other pictures cover, because these cannot move. Then text at the top and the bottom is placed, because it
+ * depends most on the borders. Colour bars share the remaining height of the picture at their side. Every other block
+ * gets the free position nearest to its anchor, the corner or side of the picture at which it should be. Candidate
  * positions align with edges of the blocks already placed, so that their number is small and bounded. */
 #include "layout.h"
 
@@ -110,8 +111,8 @@ bool find_free_bounds(const layout_state &s, insitu_anchor at, double width, dou
 
 /* ---- lines of text ---------------------------------------------------------------------------------------------- */
 
-/* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters are
- * counted. The result covers at least one character, even if it does not fit. */
+/* Returns how many bytes at the beginning of a word fit in the width if no UTF-8 character is divided. The result
+ * covers at least one character, even if this does not fit. */
 std::size_t count_bytes_that_fit(const layout_state &s, const std::string &word, int size, double available_width)
 {
     const double width = s.measure(word, size);
@@ -281,8 +282,9 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     return b;
 }
 
-/* Finds the free range of heights in the vertical strip of the picture from x0 to x1. Blocks in the strip whose middle
- * is above the middle of the picture limit the range at the top, other blocks limit it at the bottom. */
+/* Finds the range of y that is free for bars, from top to bottom, in the vertical strip of the picture from x0 to x1.
+ * The range is below all blocks of the strip whose middle is in the upper half of the picture, and above all other
+ * blocks of the strip. */
 void find_free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;
@@ -307,7 +309,8 @@ std::vector<double> list_column_edges(const layout_state &s, const bar_group &g)
     return out;
 }
 
-/* Stacks `count` bars of the group, from `first` on, in the column. Returns false if they would be too short. */
+/* Stacks `count` bars of the group, beginning with the bar `first`, in the given column. Returns false if they would be
+ * too short or overlap another block. */
 bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, std::size_t count, double edge,
                  int column, std::vector<block> &out)
 {
@@ -371,7 +374,8 @@ std::string quote_decoration_name(const char *decorations, const char *text)
     if (name.size() > NAMED) {
         name.erase(std::size_t{NAMED});
         while (!name.empty() && (static_cast<unsigned char>(name.back()) & 0xC0) == 0x80) name.pop_back();
-        /* removes the first byte of a character that was cut in the middle, or the last letter */
+        /* the last byte now begins a character that may have been cut; it is removed, even if it is a complete
+         * letter */
         if (!name.empty()) name.pop_back();
         name += "...";
     }
@@ -390,7 +394,7 @@ void place_bars(layout_state &s, insitu_anchor at)
     }
 }
 
-/* ---- covered parts and other decorations ------------------------------------------------------------------------ */
+/* ---- covered areas, scale bar, axes and labels ------------------------------------------------------------------ */
 
 /* Adds a block for each area that another picture covers, with a gap around it, so that no decoration touches the frame
  * of that picture. */

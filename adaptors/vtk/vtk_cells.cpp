@@ -133,7 +133,8 @@ const cell_conversion &higher_conversion(uint8_t type)
     return table[type];
 }
 
-/* Returns whether a Lagrange cell with the same order along all axes can have this number of points. */
+/* Returns whether libinsitu can draw a Lagrange cell with this number of points as it is: the number must be that of a
+ * cell with the same order, 1 to 32, along all axes; for pyramids, the order must be 1 or 2. */
 bool is_complete(int type, int64_t points)
 {
     for (int64_t p = 1; p <= 32; p++) {
@@ -145,7 +146,7 @@ bool is_complete(int type, int64_t points)
     return false;
 }
 
-/* Pointers to the cell arrays of one VTK grid. */
+/* The cell arrays of one VTK grid. offsets[i] is the index of the first point of cell i in `connectivity`. */
 template <typename Id> struct raw_cells {
     const uint8_t *types;
     const Id *offsets;
@@ -181,8 +182,8 @@ template <typename Id> struct raw_cells {
     }
 };
 
-/* The sizes of the cell lists that are made from VTK's, and whether every cell of the new list has the index that it
- * has in VTK's list. */
+/* The sizes of the lists of cells to which VTK's list is converted. is_one_to_one: true if every cell of the new list
+ * has the index that it has in VTK's list. */
 struct new_size {
     int64_t cells = 0;
     int64_t vertices = 0;
