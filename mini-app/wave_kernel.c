@@ -116,7 +116,7 @@ INLINE void compute_face_mean(const wave_cell_shape *shape, int f, const real p[
     }
 }
 
-/* Computes the integrals of u.n and of p n over the cell's surface. */
+/* Computes integrals over the cell's surface: of u.n in integral[0], and of p n in integral[1], [2] and [3]. */
 INLINE void integrate_faces(const cell_view *view, const real p[8][4], real integral[4])
 {
     for (int k = 0; k < 4; ++k) integral[k] = 0;

@@ -42,8 +42,8 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
 
 double wave_source_rate(const wave_source *source, double time);
 
-/* Returns the share of the source's injection rate that is injected at this position, per unit volume; 0 beyond five
- * radii. */
+/* Returns the fraction of the source's injection rate that is injected per unit volume at this position; 0 farther than
+ * five radii from the source. */
 double wave_source_density(const wave_source *source, const double xyz[3]);
 
 #endif

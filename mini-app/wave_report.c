@@ -63,8 +63,9 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
     fflush(stdout);
 }
 
-/* Ends the text after the YAML scalar at its beginning: at the closing quote, or before a comma, a blank or a closing
- * brace that was not opened in the scalar ("{cycle}" contains both braces). */
+/* Shortens the text to the YAML scalar at its beginning, without quotes. The scalar ends at the closing quote, or
+ * before a comma, a blank, a closing bracket, or a closing brace that was not opened in the scalar ("{cycle}" contains
+ * both braces). */
 static void cut_text_after_scalar(char *text)
 {
     char quote = *text == '"' || *text == '\'' ? *text : 0;

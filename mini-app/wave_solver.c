@@ -101,7 +101,8 @@ static void measure_cells(const wave_mesh *mesh, int32_t cell, wave_cell_geometr
     wave_cell_measure(shape, (const double(*)[3])position, id, out);
 }
 
-/* Stores the faces and volume of an own cell; returns the largest stable time step for it. */
+/* Stores the normals and areas of an own cell's faces, and its volume; returns the largest stable time step for the
+ * cell. */
 static double measure_own_cell(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
 {
     int bytes = s->setup.real_bytes, count = wave_cell_shape_of(wave_mesh_type(s->mesh, cell))->face_count;

@@ -199,7 +199,8 @@ double visible_range_fraction(const grid_list &grids, const std::string &field, 
     return (last - first) / (high - low);
 }
 
-/* Returns the normal of the cut with the largest projected area: an axis, with the sign that points towards the
+/* Returns the normal of the best cut. Of the three planes through the centre that are perpendicular to an axis, the
+ * best one has the largest projected area within the bounds, as seen by the viewer. The normal points towards the
  * viewer. */
 std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewer)
 {

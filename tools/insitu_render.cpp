@@ -167,8 +167,8 @@ void show_warnings(const rank_info &w, const std::string &text, run_state &run, 
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
 }
 
-/* Returns warnings with numbers of cells, summed over all ranks; each rank's adaptor counts only the cells of this
- * rank. */
+/* Returns warnings about cells that are not drawn as they are. sums: numbers of cells over all ranks; [0]: drawn, [1]:
+ * drawn as linear cells, [2]: points and lines, [3]: other cells that are not drawn. */
 std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;

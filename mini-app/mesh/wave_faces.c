@@ -1,7 +1,7 @@
-/* Finds the neighbour across each face. Faces are hashed by their vertex ids. Every face of a cell of this rank must
- * belong to exactly one other cell too, or lie on a wall of the box. The hash table stores, under a face's vertex ids,
- * the first cell that has this face. When a second cell with the face is found, the two cells become neighbours. The
- * entry remains and is marked, so that a third cell with the face is detected. */
+/* Finds the neighbour across each face. Every face of an own cell must either lie on a wall of the box, or belong to
+ * exactly one other cell too. A hash table stores the first cell that has a face; the key is the face's vertex ids.
+ * When a second cell with the face is found, the two cells become neighbours. The entry remains and is marked, so that
+ * a third cell with the face is counted as an error (wave_mesh.unmatched). */
 #include "wave_faces.h"
 
 #include <stdlib.h>

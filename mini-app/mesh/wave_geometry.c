@@ -46,8 +46,8 @@ static double compute_face_volume(const double p[4][3], int size)
            12;
 }
 
-/* Computes the vertices of a face relative to origin, in an order that begins with the vertex with the smallest id. The
- * two cells that share the face therefore compute it with the same rounding. */
+/* Stores in p[] the vertices of a face relative to origin, beginning with the vertex with the smallest id. Both cells
+ * that share the face begin with the same vertex, and therefore round the face's area and volume in the same way. */
 static void face_points(const wave_cell_shape *shape, int face, const double position[8][3], const int64_t id[8],
                         const double origin[3], double p[4][3])
 {

@@ -4,8 +4,9 @@
  *             lowest to its highest corner
  *   hex       one: no face is split
  *   wedges    two, extruded along z: the z faces are split as for tets, the x and y faces are not split
- *   pyramids  six around a vertex in the centre. A face that must be split for the neighbour becomes two tets
- *             instead: these cubes are the transition between all other kinds.
+ *   pyramids  six, one on each face, with their tips at the centre of the cube. If the neighbouring cube splits a
+ *             common face, two tets replace the pyramid on this face. Cubes of pyramids can therefore lie between
+ *             all other kinds of cubes.
  *
  * A mixed lattice contains, from below: hexes, one layer of pyramid cubes, tets, wedges (both need the same split of
  * the z faces between them), another layer of pyramid cubes, and hexes. A third of the hexes are replaced by pyramid

@@ -69,8 +69,8 @@ bool has_ids(const std::string &line)
     return line.find("given") != std::string::npos || line.find("ignore") != std::string::npos;
 }
 
-/* Returns the first line of the contents. Binary files, including those of variables, may have a line that names the
- * encoding in front of it. */
+/* Returns the first line of the file, or the second one if the file is binary and the first line names the encoding, as
+ * it must in geometry files and may in files of variables. */
 std::string first_line(ensight_stream &in, encoding how)
 {
     const std::string line = in.line();
@@ -79,9 +79,9 @@ std::string first_line(ensight_stream &in, encoding how)
     return is_name ? in.line() : line;
 }
 
-/* Returns whether the file has another step, and reads its first line of description. For the first step, `line` must
- * be the file's first line, because a file with a single step may lack the line "BEGIN TIME STEP". For later steps,
- * `line` must be "". */
+/* Begins a step and reads the first of its lines of description; returns false if the file has no further step. For the
+ * first step, `line` must be the file's first line, because a file with a single step may lack the line "BEGIN TIME
+ * STEP". For later steps, `line` must be "". */
 bool begin_next_step(ensight_stream &in, std::string line, bool is_first)
 {
     if (!is_first && !in.next_line(line)) return false;

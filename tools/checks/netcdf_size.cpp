@@ -104,8 +104,8 @@ class header
     int version_ = 0;
     int64_t records_ = 0;
     std::vector<int64_t> dimensions_;
-    int64_t fixed_end_ = 0;    // end in the file of the variables without records
-    int64_t record_end_ = 0;   // end in the file of the first record; 0 if there are no records
+    int64_t fixed_end_ = 0;    // position in the file at which the last variable without records ends
+    int64_t record_end_ = 0;   // position in the file at which the first record ends; 0 if there are no records
     int64_t record_bytes_ = 0; // size in bytes of one record of all variables
 };
 

@@ -148,7 +148,7 @@ vtkSmartPointer<vtkDataObject> hide_others(vtkDataSet *grid, int64_t first_cell,
     return copy;
 }
 
-/* How the cells of a data set are distributed, and the rank whose part is made. */
+/* How the cells of a data set are distributed to ranks, and the rank whose part is extracted. */
 struct deal {
     const owner &owners;
     partition how;

@@ -1,6 +1,6 @@
-/* An extent is divided recursively: its longest axis is cut in two, and so is the set of the ranks that share it.
- * Therefore parts are compact. If axes have equal length, the slowest one is cut, so that a part consists of long
- * sequences of bytes of the file. */
+/* An extent is divided recursively: its longest axis is cut in two, and the ranks that share the extent are divided
+ * into two sets, one for each side of the cut. Therefore parts are compact. If axes have equal length, the slowest one
+ * is cut, so that a part consists of long sequences of bytes of the file. */
 #include "extent_parts.h"
 
 #include <algorithm>
