@@ -77,12 +77,12 @@ static void average_to_vertices(const wave_grid *grid)
 {
     const real *weights = grid->vertex_cell_weights, *state = grid->state.values;
     real *out = grid->vertex_state.values;
-    int64_t stride = grid->state.stride, is_soa = grid->state.component_stride;
+    int64_t stride = grid->state.stride, component_stride = grid->state.component_stride;
     for (int32_t v = 0; v < grid->own_vertices; ++v) {
         real sum[4] = {0, 0, 0, 0};
         for (int64_t i = grid->vertex_cell_offsets[v]; i < grid->vertex_cell_offsets[v + 1]; ++i) {
             const real *q = state + grid->vertex_cells[i] * stride;
-            for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * is_soa];
+            for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * component_stride];
         }
         for (int a = 0; a < 3 && grid->reflecting; ++a) {
             if (grid->walls[v] >> a & 1) sum[1 + a] = 0;
@@ -97,10 +97,10 @@ static void average_to_vertices(const wave_grid *grid)
 INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
 {
     const real *values = grid->vertex_state.values;
-    int64_t stride = grid->vertex_state.stride, is_soa = grid->vertex_state.component_stride;
+    int64_t stride = grid->vertex_state.stride, component_stride = grid->vertex_state.component_stride;
     for (int i = 0; i < view->shape->vertex_count; ++i) {
         const real *from = values + (int64_t)view->vertex[i] * stride;
-        for (int k = 0; k < 4; ++k) p[i][k] = from[k * is_soa];
+        for (int k = 0; k < 4; ++k) p[i][k] = from[k * component_stride];
     }
 }
 

@@ -341,14 +341,14 @@ bool place_group(layout_state &s, const bar_group &g, double edge)
         if (columns > 1 && static_cast<double>(columns) * g.width > 0.5 * s.image.width) return false;
         std::vector<block> bars;
         const std::size_t rows = (count + columns - 1) / columns;
-        bool is_transformed = true;
+        bool has_space = true;
         const std::size_t used = (count + rows - 1) / rows;
-        for (std::size_t i = 0; i < used && is_transformed; i++) { /* the first column is the leftmost one */
+        for (std::size_t i = 0; i < used && has_space; i++) { /* the first column is the leftmost one */
             const std::size_t column = g.anchor == INSITU_LEFT ? i : used - 1 - i;
-            is_transformed =
+            has_space =
                 fill_column(s, g, i * rows, std::min(rows, count - i * rows), edge, static_cast<int>(column), bars);
         }
-        if (!is_transformed) continue;
+        if (!has_space) continue;
         s.out.blocks.insert(s.out.blocks.end(), bars.begin(), bars.end());
         return true;
     }
