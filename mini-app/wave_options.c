@@ -50,7 +50,8 @@ struct option_row {
     size_t offset;
     const char *expected; /* description of the expected value for messages; if the option has a fixed set of values,
                              these are separated by '|' */
-    const int *choice;    /* value of each word of a choice; NULL means 0, 1, 2, ... */
+    const int *choice; /* for an option with a fixed set of values: the number that each value stands for; NULL means 0,
+                          1, 2, ... */
     double low, high;
 };
 

@@ -66,10 +66,11 @@ void parse_camera(const std::string &text, options &o)
     o.direction = direction;
 }
 
-/* A name in which each sequence of digits is replaced by '#', and these sequences. */
+/* A path, by whose numbers files are sorted. shape: the path with each sequence of digits replaced by '#'. Only paths
+ * of the same shape are compared. */
 struct numbered_name {
     std::string path, shape;
-    std::vector<std::string> numbers; // the sequences of digits without leading zeros
+    std::vector<std::string> numbers; // the sequences of digits in the path, without leading zeros
 
     explicit numbered_name(const std::string &of) : path(of)
     {
@@ -230,8 +231,8 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     app.add_option("file", names);
 }
 
-/* Removes the scene, if there is one, from the names: the name with a scene's extension, or a first name that is not
- * data. */
+/* Moves the name of the scene file, if there is one, from `names` to the options. It is the name with a scene's
+ * extension, or otherwise the first name if that cannot be read as data. */
 void extract_scene(std::vector<std::string> &names, options &o)
 {
     if (names.empty()) throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");

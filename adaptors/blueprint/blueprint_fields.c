@@ -90,7 +90,7 @@ static bool next_field(field_walk *w)
     return false;
 }
 
-/* ---- strides of lattices ---------------------------------------------------------------------------------------- */
+/* ---- strides of structured grids -------------------------------------------------------------------------------- */
 
 /* Computes the number of cells (if is_element) or vertices along each axis of the lattice; it is at least 1. */
 static void get_element_counts(const blueprint_mesh *mesh, bool is_element, int64_t counts[3])

@@ -6,7 +6,7 @@
 
 static const char *const index_names[3] = {"i", "j", "k"};
 
-/* ---- lattices --------------------------------------------------------------------------------------------------- */
+/* ---- lattices (structured grids) -------------------------------------------------------------------------------- */
 
 /* Stores the number of vertices along each axis; each number must be at least 1. A topology whose cells have fewer than
  * two dimensions is left out. */

@@ -191,8 +191,9 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     file.finish();
 }
 
-/* Large blocks are allocated before the reserve, so that the reserve is available to OpenImageIO and the libraries that
- * it uses: for tables that they create with the first picture, for a few rows, and for compressors. */
+/* The buffer of the encoded file is allocated before the reserve. The whole reserve (memory_reserve.h) is therefore
+ * available to OpenImageIO and the libraries that it uses: for tables that they create with the first picture, for a
+ * few rows, and for compressors. */
 void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
 {
     enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };

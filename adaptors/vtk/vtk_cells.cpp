@@ -1,7 +1,7 @@
 /* For each VTK cell type that libinsitu draws, a table (cell_conversion) contains the linear cell that represents it,
- * and which of its points are the linear cell's vertices. If all cells of a grid have types that libinsitu reads
- * directly (tets, hexes, wedges, pyramids), VTK's arrays are used unchanged. If a single cell has another type, all
- * cells are copied to a new list.
+ * and which points of VTK's cell are the vertices of the linear cell. If all cells of a grid have types that libinsitu
+ * reads directly (tets, hexes, wedges, pyramids), VTK's arrays are used unchanged. If a single cell has another type,
+ * all cells are copied to a new list.
  *
  * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides
  * become libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Quadratic and Lagrange cells are cell
