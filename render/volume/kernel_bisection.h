@@ -1,18 +1,20 @@
 /* Bisects those parts of a ray's interval in a hex, wedge or pyramid for which no number of equal segments is accurate
- * enough. At a step of the opacity there is no slope that would bound the effect of a small field error on the light.
- * If a curved field barely exceeds the value of the step, the length of the ray on which it does grows with the square
- * root of the excess: at 800 optical depths an error of the field of 1e-6 of the transfer function's domain changes
- * such a pixel by a tenth. So the bisection is computed in double, from the mesh's coordinates and values and the ray's
- * position in the picture, one ray at a time, and identically for all instruction sets.
+ * enough (kernel_segments.h defines segments). A step is a value at which the opacity jumps. No finite slope bounds the
+ * effect that a small field error has there on the light. If a curved field barely exceeds that value, the length of
+ * the part of the ray on which it exceeds the value grows with the square root of the excess: at 800 optical depths an
+ * error of the field of 1e-6 of the transfer function's domain changes such a pixel by a tenth. So the bisection is
+ * computed in double, from the mesh's coordinates and values and the ray's position in the picture, one ray at a time,
+ * and identically for all instruction sets.
  *
  * Subintervals. The chord of a subinterval is the linear function with the field's values at the two ends. The field is
  * computed at the ends, quarters and middle; its deviation from the chord is taken as at most d, which is 1.5 times the
- * largest deviation at the quarters and the middle. (For a cubic, that is at least 7/8 of the maximum.) A cubic
- * deviates from its chord by s (1 - s) (u + q (s - 1/2)), s from 0 to 1, and its slope deviates from the chord's by at
- * most u + q / 2, at an end. If the deviation is at most e at the middle and the quarters, then |u| <= 4 e, |u| + |q| /
- * 4 <= 16/3 e, and the slope's deviation is at most 32/3 e. So if the chord rises by 12 e or more the field is
- * monotone, with a margin for nonlinear maps, and so is each part of it. If it is monotone, its values lie between
- * those at its ends, and otherwise between these widened by d to both sides. A subinterval that
+ * largest deviation at the quarters and the middle. (For a cubic, the largest of these three deviations is at least 7/8
+ * of the maximum deviation.) A cubic deviates from its chord by s (1 - s) (u + q (s - 1/2)), s from 0 to 1, and its
+ * slope deviates from the chord's by at most u + q / 2, at an end. If the deviation is at most e at the middle and the
+ * quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and the slope's deviation is at most 32/3 e. So if the chord
+ * rises by 12 e or more the field is monotone on the subinterval and on each part of it; the criterion leaves a margin
+ * for nonlinear maps. If the field is monotone, its values lie between the values at the ends. Otherwise they lie in
+ * this range, extended by d on both sides. A subinterval that
  *   - lies on one side of each step and has a chord that is close enough becomes a segment;
  *   - is monotone, with a step's value strictly between those at its ends, is cut where the field has that value;
  *   - is of neither kind is halved, and the halves are treated in the same way, the nearer one first.
@@ -60,7 +62,7 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
 
 /* KERNEL_BISECTION_DEPTH: maximum number of halvings; 2^-40 of an interval is negligible in any medium.
  * KERNEL_BISECTION_ROOM: size of the stack of subintervals. KERNEL_BISECTION_SEGMENTS: after that many segments the
- * rest of the interval is not divided further, a safeguard that no function in use reaches. */
+ * rest of the interval is not divided further; this is a safeguard that no known transfer function reaches. */
 enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTION_SEGMENTS = 8192 };
 
 /* ---- the field on a ray ---- */
@@ -93,9 +95,9 @@ static inline double kernel_interpolate(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* Computes the ray's point at depth t, as kernel_value_at() does, but in double: reference coordinates by Newton's
- * method from the initial guess `guess`, then from the cell's middle. If both fail, reference coordinates and field are
- * interpolated between the ends of the interval. */
+/* Computes the ray's point at depth t, as kernel_value_at() does, but in double. Newton's method finds the reference
+ * coordinates, first from the initial guess `guess` and, if it does not converge, from a point near the cell's middle.
+ * If both attempts fail, reference coordinates and field are interpolated between the ends of the interval. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     kernel_exact_point out = {.t = t};
@@ -117,7 +119,7 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
     return out;
 }
 
-/* Returns the ray's point between a and b, at a share of the depth between them. */
+/* Returns the ray's point at the depth a->t + share * (b->t - a->t), between the points a and b. */
 static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
                                                      const kernel_exact_point *b, double share)
 {
@@ -127,7 +129,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
 }
 
 /* Returns the ray's point between a and b at which the field is x. The values at a and b must lie on different sides of
- * x. It uses regula falsi in the Illinois variant, which halves the value at an end that is kept. */
+ * x. The search is regula falsi in the Illinois variant (it halves the value at an end that is kept), with a bisection
+ * in every third step. */
 static kernel_exact_point kernel_exact_point_of_value(const kernel_bisection *h, const kernel_exact_point *a,
                                                       const kernel_exact_point *b, double x)
 {
@@ -180,9 +183,10 @@ static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, d
     return out;
 }
 
-/* A subinterval of a ray's interval, which begins where the previous one ends. depth: number of divisions that made it;
- * is_monotone: the field has been proved to be monotone on it; deviation: largest deviation of the field from its chord
- * at the quarters and the middle; low, high: range of the field's values. */
+/* A subinterval of a ray's interval. Its begin is not stored, because it is the end of the previous subinterval. depth:
+ * number of divisions that made the subinterval; is_monotone: the field has been proved to be monotone on it;
+ * deviation: largest deviation of the field from its chord at the quarters and the middle; low, high: range of the
+ * field's values. */
 typedef struct kernel_subinterval {
     kernel_exact_point end, middle;
     int depth;
@@ -233,16 +237,16 @@ static const double *kernel_step_between(const kernel_bisection *h, double low, 
     return NULL;
 }
 
-/* Computes the range of float32 values between the two neighbouring steps of the opacity between which `inside` lies.
- */
+/* Computes the range side[0] .. side[1] of float32 values between two neighbouring steps of the opacity: those between
+ * which the value `inside` lies. */
 static void kernel_range_between_steps(const kernel_bisection *h, double inside, float side[2])
 {
     const double *steps = h->list->pieces->steps;
     int n = 0;
     side[0] = -3e38f, side[1] = 3e38f;
     for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_rounded_step(steps[n]);
-    /* a segment whose values all equal a step's value counts as above the step, so the range ends just below the step,
-     * and rounding moves no other segment there */
+    /* a segment whose values all equal a step's value counts as above the step; so the range ends at the float32 just
+     * below the step, and values below the step are never rounded up to the step */
     if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_rounded_step(steps[n]), side[0]);
 }
 
@@ -281,9 +285,9 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
                                  vf_set((float)rest[1])};
 }
 
-/* Adds the subinterval as a segment that has the field's values at its ends. Segments of equal length are raised so
- * that their mean is that of the field (kernel_local_budget.h). A segment of the bisection is not raised, because it
- * might then reach values for which no error bound has been computed. */
+/* Adds the subinterval as a segment that has the field's values at its ends. Unlike segments of equal length, to whose
+ * values an offset is added so that their mean is that of the field (kernel_local_budget.h), it gets no offset: with
+ * one it might reach values for which no error bound has been computed. */
 static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {

@@ -21,13 +21,13 @@
  *
  * An edge function is affine in the ray's u and v (kernel_cell.h). So are three functions of a face: the sum D of its
  * three edge functions; the sum N of its vertices' depths, each times the opposite edge's function; and the same sum of
- * its vertices' values. They have nine coefficients, which are computed once per cell and window, one tet per lane;
- * each ray gathers those of the two faces that it crosses. The ray meets the face's plane at the depth N / D. Because
- * the decision that the ray crosses the face is made in float32, that point may lie outside the face: an edge function
- * there may be negative by about 1e-7 of its terms' magnitudes. If D is less than KERNEL_DOUBLE_EDGE times these
- * magnitudes, the face is seen so nearly edge on that the point may be far outside the face, and the segment keeps both
- * float32 ends. Everything is computed from the face's vertices in their order and from the ray, so that both cells of
- * a face compute the same point if both use double. */
+ * its vertices' values. These three functions have nine coefficients in all, which are computed once per cell and
+ * window, one tet per lane; each ray gathers those of the two faces that it crosses. The ray meets the face's plane at
+ * the depth N / D. Because the decision that the ray crosses the face is made in float32, that point may lie outside
+ * the face: an edge function there may be negative by about 1e-7 of its terms' magnitudes. If D is less than
+ * KERNEL_DOUBLE_EDGE times these magnitudes, the face is seen so nearly edge on that the point may be far outside the
+ * face, and the segment keeps both float32 ends. Everything is computed from the face's vertices in their order and
+ * from the ray, so that both cells of a face compute the same point if both use double. */
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
@@ -64,7 +64,8 @@ enum {
     KERNEL_DOUBLE_NUMBERS
 };
 
-/* The numbers of one face of one tet per lane, in two halves of the lanes. */
+/* The numbers of one face of each lane's tet, indexed by the number (KERNEL_DOUBLE_DEPTH etc.) and the half of the
+ * lanes. */
 typedef kernel_f64 kernel_double_face[KERNEL_DOUBLE_NUMBERS][2];
 
 /* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
@@ -141,7 +142,7 @@ static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_f
     }
 }
 
-/* ---- rays with a tet each ---- */
+/* ---- segments in tets, one ray-tet pair per lane ---- */
 
 /* A ray's point in the plane of a face: depth t and value, in two halves of the lanes. sound: rays that do not see the
  * face edge on. */
@@ -214,7 +215,7 @@ SIMD_INLINE void kernel_double_segments(const kernel_double_face *faces, vi lane
 
 enum { KERNEL_EXACT_STEPS = 24 };
 
-/* ---- the map and the field ---- */
+/* ---- map and field of a hex, wedge or pyramid at one point ---- */
 
 /* Computes the polynomial coefficients (kernel_map.h) of the map of a hex, wedge or pyramid to tile space (3 rows), and
  * of the field in the transfer function's domain (last row). */
@@ -231,8 +232,8 @@ static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const k
     for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);
 }
 
-/* Returns the product term m of the cell's map (kernel_map.h) at the reference coordinates r, and its derivatives along
- * r. */
+/* Returns the product term m of a cell's map (kernel_map.h) at the reference coordinates r: r[0] r[1] or, in a pyramid,
+ * r[0] r[1] / r[2]. Also computes the derivatives of m by r (slopes). */
 static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
 {
     slopes[0] = r[1];
@@ -253,7 +254,8 @@ static inline double kernel_exact_value(const double c[8], const double r[3], do
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes the polynomial's derivatives along r. m, slopes: results of kernel_exact_product(). */
+/* Computes the derivatives, by the reference coordinates r, of the polynomial with the coefficients c. m, slopes:
+ * results of kernel_exact_product(). */
 static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
                                          double out[3])
 {

@@ -27,9 +27,9 @@
  *
  * A ray's position in a piece is stored as its distances to the piece's two ends, and opacity and 1 - opacity are
  * interpolated from both ends. The length in a piece is computed from the values that the ray takes there, not from
- * positions on the segment. Each quantity is then exact to a few units in its own last place. With a value and a
- * position on the segment instead, the rounding of 1 would affect the steepest slope of the function and its narrowest
- * piece.
+ * positions on the segment. Each quantity is then exact to a few units in its own last place. If a value and a position
+ * from 0 to 1 on the segment were stored instead, both would have the rounding errors of numbers near 1, which steep
+ * slopes and narrow pieces of the function would magnify.
  *
  * Tests compile this file a second time for doubles with more nodes (KERNEL_REAL_IS_DOUBLE), to show that it converges
  * to the exact integral. */
@@ -104,8 +104,8 @@ SIMD_INLINE kernel_light kernel_light_none(void)
 }
 
 /* One segment per lane: its length in unit distances, and the values at its ends in the transfer function's domain.
- * Each value is v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and
- * poles of the function magnify it. */
+ * Each value is v + rest, where rest is the rounding error of v as far as it is known. This error matters because it is
+ * magnified at steps of the opacity, and where the extinction grows towards infinity, at an opacity of 1. */
 typedef struct kernel_unit_segment {
     vf length, v_in, v_out, rest_in, rest_out;
 } kernel_unit_segment;
@@ -185,8 +185,8 @@ typedef struct kernel_piece_state {
     vf remaining;        /* remaining change of the value within this piece */
     vf remaining_length; /* length of the ray over which this change takes place, in unit distances */
     vf shortest;         /* lower limit of a step's length, in unit distances */
-    /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
-     * segment's begin */
+    /* value at that end of the piece towards which the field changes along the ray, and the rounding error of this
+     * value; before the first piece is entered: the value at the segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
     /* The following members are the same in all pieces: falling: the value decreases along the ray; level: it is

@@ -39,12 +39,13 @@
  * 0. A deviation that the three places do not show is of at least the fifth order, so that 2 p^4 e is enough for a part
  * of the interval with share p.
  *
- * These constants are measured. The test set was random rays in 5,000 random cells with N up to 0.89, and the fields
- * that have E = 0, or all three places on the chord, and the largest possible error of the mean. The polynomial's mean
- * erred by at most 0.54 E on whole intervals, 0.57 E on halves, 0.72 E on quarters and 0.36 E on eighths. The field
- * itself deviated by at most 3.1 E on average, except for 19 of 133,000 of these fields (5.8 E), and by 50 E for fields
- * optimized to make E, P and A vanish in hexes that are hardly bent (N < 0.05). The bound of the mean of |v - f| for
- * one segment held in all of them; the bound for several segments is too small there. */
+ * These constants are measured. The test set was random rays in 5,000 random cells with N up to 0.89. Two kinds of
+ * fields were tested: those for which E = 0, and those that equal the chord at all three places; in both cases with the
+ * largest possible error of the mean. The polynomial's mean erred by at most 0.54 E on whole intervals, 0.57 E on
+ * halves, 0.72 E on quarters and 0.36 E on eighths. The field itself deviated by at most 3.1 E on average, except for
+ * 19 of 133,000 of these fields (5.8 E), and by 50 E for fields optimized to make E, P and A vanish in hexes that are
+ * hardly bent (N < 0.05). The bound of the mean of |v - f| for one segment held in all of them; the bound for several
+ * segments is too small there. */
 #ifndef RENDER_KERNEL_LOCAL_BUDGET_H
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 
@@ -107,10 +108,11 @@ SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, cons
 }
 
 /* Computes the bounds of a cell whose map is too nonlinear for processing in lanes; all lanes of *out get the same
- * bounds. The map's derivatives are not bounded. N^2 is therefore taken as 3, and the range of the values takes the
- * place of S, the sum of the nonlinear terms' slopes. E is then at least 1.4 times the error of the polynomial's mean
- * in 200,000 hexes, wedges and pyramids whose vertices are moved by up to 0.55 edges along each axis, so that some are
- * nearly folded, with fields that have E = 0, or all three places on the chord. */
+ * bounds. No bounds of the map's derivatives are known. In the lower limit of E (top of this file) N^2 is therefore
+ * taken as 3, and the range of the values takes the place of S. This limit was at least 1.4 times the error of the
+ * polynomial's mean in a test of 200,000 hexes, wedges and pyramids whose vertices were moved by up to 0.55 edges along
+ * each axis, so that some were nearly folded. The test used fields whose three sampled deviations give E = 0, or are
+ * all 0. */
 SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
                                             kernel_local_bounds *out)
 {
@@ -153,7 +155,7 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const ker
  *     weight_change   oscillation of T g that the changes of T and b along the segment cause */
 
 /* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of
- * the part of v - f that has mean zero, plus the effect of the errors of the mean. */
+ * the part of v - f (segment minus field) that has mean zero, plus the effect of the errors of the segment's mean. */
 SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
                                                  vf error_variation, vf cost)
 {
@@ -161,8 +163,9 @@ SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residua
     return vf_muladd(half, mean, cost * (quartic + residual_error));
 }
 
-/* Computes *error_variation (`swing` at the top of this file) and *cost over the range of the ray's own values, which
- * includes the ends of raised segments. quartic: E. Returns the rays on which the opacity has a step in this range. */
+/* Computes *error_variation (`swing` at the top of this file) and *cost, the bounds of the effect of field errors on
+ * light, over the range of values on the ray's own interval and at the ends of its segments. quartic: E. Returns the
+ * rays on which the opacity has a step in this range. */
 SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
                                       vf *error_variation, vf *cost)
 {
@@ -217,8 +220,9 @@ SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pa
 }
 
 /* Sets p->count, the number of segments of each ray; returns the rays for which no number of segments is accurate
- * enough. It first tests whether one segment is accurate enough, with the bounds over all of the cell's values, and the
- * error that is allowed for the ray's length alone. Only other rays use kernel_local_count_by_depth(). */
+ * enough. The function first tests whether one segment is accurate enough, with bounds over all of the cell's values,
+ * and with the error that is allowed in proportion to the interval's length. Only for rays that fail this test, it
+ * calls kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_choose_segment_counts(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
                                                   kernel_local_pairs *p)
 {

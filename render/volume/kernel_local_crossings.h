@@ -111,8 +111,8 @@ static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const ke
                    rays, two, alone, face);
 }
 
-/* Finds the rays that cross exactly two faces of their cells once each (*two), and the indices of these faces. Rays for
- * which that is uncertain are added to *alone, to be processed cell by cell. */
+/* Finds the rays that certainly cross exactly two faces of their cells, once each (*two), and the indices of these
+ * faces in the cell (face). *alone: rays for which that is uncertain, and which must be processed cell by cell. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
                                          int type, vm *two, vm *alone, vi face[2])
 {
@@ -125,9 +125,9 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells,
 }
 
 /* Reads the corners of the two faces that each ray crosses, if the given rays have at most two different cells. One
- * permutation of these two cells' rows then reads one number of a corner for all rays. Most vectors of 16 rays have at
- * most two cells, because rays are listed cell by cell. Returns false if there are more cells, or if vectors do not
- * have 16 lanes. */
+ * permutation of the rows of numbers of these two cells (cells->rows) then reads one number of a corner for all rays.
+ * Most vectors of 16 rays have at most two cells, because rays are listed cell by cell. Returns false if there are more
+ * cells, or if vectors do not have 16 lanes. */
 SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *cells, const kernel_lane_rays *own,
                                               vm rays, const vi face[2], kernel_curved_corners out[2])
 {

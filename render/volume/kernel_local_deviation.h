@@ -18,8 +18,8 @@
  *
  * r is found by Newton's method, from the line between its values at the faces. A step uses the derivatives in the
  * middle of the cell, where n' is zero: it adds the residual to r, and the next residual is about |n'| times as large.
- * That needs a third of the terms of a step with the derivatives at the current point. All places are computed
- * together.
+ * Such a step has a third of the terms of a step with the derivatives at the current point. The steps for all places
+ * are computed together.
  *
  * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
  * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
@@ -57,17 +57,19 @@ typedef struct kernel_local_bounds {
     /* square of the upper bound N of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
     /* e N^2 S of kernel_local_budget.h, a lower limit of E, the quartic part of the field's deviation. It covers
-     * deviations that do not show at the three inner places. */
+     * deviations that are 0 at a quarter, the middle and three quarters of the interval, the only places where the
+     * deviation is evaluated. */
     float unsampled[SIMD_WIDTH];
     float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
     float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
     /* Bounds of the change of light by a field error, over the values from `low` to `high`: the range of the lane's
-     * cell, with a margin. cost: maximum of the change per unit of error and unit distance; error_variation: its
-     * variation (KERNEL_LIGHT_COST, KERNEL_LIGHT_VARIATION). */
+     * cell, with a margin. cost: maximum of the change per unit of error and unit distance; error_variation: largest
+     * difference between the changes at two of the values (KERNEL_LIGHT_COST, KERNEL_LIGHT_VARIATION). */
     float low[SIMD_WIDTH], high[SIMD_WIDTH];
     float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
-    /* upper bound of the change of T g per optical depth: cost + R |s'|, in the notation of kernel_local_budget.h */
+    /* Upper bound of how much T g changes per unit of optical depth: cost + R |s'|. T is the transmittance in front of
+     * a point, and g the change of light per unit of field error there (kernel_local_budget.h). */
     float weight_change[SIMD_WIDTH];
     float extinction[SIMD_WIDTH]; /* maximum of the extinction over these values, per unit distance */
 } kernel_local_bounds;
@@ -82,8 +84,8 @@ typedef struct kernel_local_pairs {
     vf count;    /* number of segments into which the interval is divided */
     float share; /* length of this interval as a share of the ray's whole interval in its cell */
     vf field[3]; /* deviation of the field at a quarter, the middle and three quarters of the interval */
-    /* largest residual at the inner places of this interval and, if it is a part, of the larger parts that contain
-     * it */
+    /* largest residual that Newton's method has left at the quarters and the middle of this interval and, if it is a
+     * part, of the larger parts that contain it */
     vf residual;
     vm has_diverged; /* rays for which Newton's method did not find the reference coordinates */
 } kernel_local_pairs;
@@ -96,8 +98,8 @@ SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* Returns the factor e of kernel_local_budget.h. It bounds the part of the field's deviation that does not show at the
- * three inner places. */
+/* Returns the factor e of kernel_local_budget.h. It bounds deviations of the field from its chord that are 0 at the
+ * quarters and the middle of the interval. */
 SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
@@ -142,11 +144,12 @@ typedef struct kernel_local_chord {
     const kernel_interval *interval;
 } kernel_local_chord;
 
-/* The five places of an interval or of a part of it, evenly spaced from its begin to its end, for one ray per lane. */
+/* The five places (0 to 4) of an interval or of a part of it: begin, quarter, middle, three quarters and end, for one
+ * ray per lane. */
 typedef struct kernel_local_places {
     float u, width;     /* u: position at which the part begins; width: its length, as a share of the whole interval */
     vf r[5][3], off[5]; /* r: reference coordinates; off: the field minus the chord of the whole interval */
-    vf residual;        /* largest residual at the inner places of this part and of the larger parts that contain it */
+    vf residual; /* largest residual at places 1 to 3 of this part and of the larger parts that contain it */
     vm is_known;        /* rays for which Newton's method found all reference coordinates */
 } kernel_local_places;
 
@@ -188,8 +191,9 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_gather_lane(bounds->residual_limit, lane);
 }
 
-/* Computes the residual y - (r + n(r)) of the reference coordinates r = p->r at position u on the interval, and stores
- * the field's deviation there as p->value. */
+/* Computes the residual y - (r + n(r)) of the reference coordinates r = p->r at position u on the interval, where y is
+ * linear along the ray and n(r) are the map's nonlinear terms (top of this file). Stores the field's deviation at this
+ * position as p->value. */
 SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int type, kernel_point *p, vf residual[3])
 {
     vf term[KERNEL_NONLINEAR_TERMS];
@@ -239,8 +243,9 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
     }
 }
 
-/* Evaluates the field at the inner places 1, 2 and 3 if `step` is 1, and at the places 1 and 3 if it is 2. On entry,
- * p->r has guesses of the places' reference coordinates. ends: the ends of the whole interval. */
+/* Evaluates the field at the places 1, 2 and 3 (kernel_local_places) if `step` is 1, and at the places 1 and 3 if
+ * `step` is 2. On entry, p->r has guesses of the places' reference coordinates. ends: the ends of the whole
+ * interval. */
 SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int step, vm rays,
                                        int type, kernel_local_places *p)
 {

@@ -29,8 +29,8 @@
 #include "simd.h"
 
 enum {
-    /* prefetch distance in cells: vertex indices are prefetched that many cells ahead, coordinates and values after
-     * them */
+    /* prefetch distance in cells: a cell's vertex indices are read, and its vertices prefetched, when that many further
+     * cells have been queued */
     KERNEL_LOCAL_AHEAD = 8,
     KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
@@ -62,11 +62,11 @@ typedef struct kernel_tet_pairs {
 /* The cells of a volume in the tile: candidates, queued cells of a mesh part, and the cells that are being processed.
  */
 typedef struct kernel_tile_cells {
-    /* The tile's candidates; used if the whole picture has been searched. The first open_count items overlap the last
-     * window in depth; `next` is the first item that begins behind all windows so far. Only the first `sorted` items
-     * are sorted by their least depth; the others are sorted when a window needs them, which saves work in tiles that
-     * soon become dark. `ends` are the partition points of the unfinished quicksort, the nearest one last: no item in
-     * front of such an index is farther than any item behind it. */
+    /* The tile's candidates, if the trees have been traversed in advance for the whole picture; otherwise not used. The
+     * first open_count items overlap the last window in depth; `next` is the first item that begins behind all windows
+     * so far. Only the first `sorted` items are sorted by their least depth; the others are sorted when a window needs
+     * them, which saves work in tiles that soon become dark. `ends` are the partition points of the unfinished
+     * quicksort, the nearest one last: no item in front of such an index is farther than any item behind it. */
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
@@ -136,8 +136,9 @@ SIMD_INLINE vm kernel_local_read_values(const kernel_transfer *t, const kernel_t
 }
 
 /* Computes the first and last column and row of the tile's pixels in which each lane's cell may be visible (ends).
- * places: x, y and z of the cells' vertices in tile space. The margin of 1/100 pixel exceeds the rounding of vertices
- * whose distance in front of the eye is at least 1/1000 of the scene's; a cell with a nearer vertex gets all pixels. */
+ * places: x, y and z of the cells' vertices in tile space. The margin of 1/100 pixel exceeds the rounding errors of
+ * projected vertices whose distance from the plane of the eye is at least 1/1000 of the scene's distance; a cell with a
+ * nearer vertex gets all pixels. */
 SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
                                      int32_t ends[4][SIMD_WIDTH])
 {

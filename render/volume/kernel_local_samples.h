@@ -48,7 +48,8 @@ typedef struct kernel_tile_volume {
     /* steps: for each ray, by packet and lane, the depth of sample number 0 and the distance between samples in depth,
      * side by side; far: the depth at which the ray ends (its nearest opaque hit), -inf for inactive rays */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
-    /* listed samples, whose values are still to be computed: depth and word of each */
+    /* listed samples, whose values are still to be computed. t: depth of each; bits: the word that describes it
+     * (KERNEL_LOCAL_LANE, KERNEL_LOCAL_NUMBER) */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
     /* The members from here on choose the depth of windows (kernel_tile_depth.h). A ray is dark if it has no light left

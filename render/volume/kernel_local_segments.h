@@ -131,9 +131,9 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
     kernel_segments_add(b->packets, false, b->is_double, places, rays, t_in, t_out, &run);
 }
 
-/* The following two functions evaluate the polynomial (1/4 - u^2) (f[0] + f[1] u + f[2] u^2), which is 0 at the
- * interval's ends, u = -1/2 and 1/2. kernel_local_deviation() returns its value at u, kernel_local_primitive() its
- * integral from 0 to u. */
+/* The following two functions evaluate the polynomial (1/4 - u^2) (f[0] + f[1] u + f[2] u^2) that is fitted to the
+ * field's deviation from its chord. It is 0 at the interval's ends, u = -1/2 and 1/2. kernel_local_deviation() returns
+ * its value at u, kernel_local_primitive() its integral from 0 to u. */
 SIMD_INLINE vf kernel_local_deviation(const vf f[3], vf u)
 {
     return (0.25f - u * u) * vf_muladd(vf_muladd(f[2], u, f[1]), u, f[0]);
@@ -146,7 +146,8 @@ SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
     return u * odd + f[1] * square * (0.125f - 0.25f * square);
 }
 
-/* Adds the rays' intervals as one segment each, raised so that its mean is that of the field. */
+/* Adds the rays' intervals as one segment each. An offset is added to the segment's values so that its mean is that of
+ * the field. */
 SIMD_INLINE void kernel_local_add_single_segments(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
@@ -189,7 +190,7 @@ SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_p
     if (vm_any(more)) kernel_local_add_equal_segments(b, p, more);
 }
 
-/* ---- parts of an interval ---- */
+/* ---- division of intervals into parts ---- */
 
 static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
                                                  const vf reach[2], float share);
@@ -311,7 +312,7 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
 
 /* Adds the segments of the rays in `wanted` (a mask of lanes) between the depths reach[0] and reach[1], by packets,
  * cell by cell; rays with the same cell and packet are processed together. places: position of each ray among the
- * tile's packets; lanes: the lane of its cell; share: as in kernel_curved_segments(). */
+ * tile's packets; lanes: the lane of each ray's cell; share: as in kernel_curved_segments(). */
 static __attribute__((noinline)) void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes,
                                                                            unsigned wanted, const vf reach[2],
                                                                            float share)
@@ -338,7 +339,8 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
     }
 }
 
-/* Adds the segments of rays whose intervals are cut by surfaces, between the depths reach[0] and reach[1]. */
+/* Adds the segments, between the depths reach[0] and reach[1], of rays whose intervals are cut by surfaces or begin or
+ * end outside these depths. */
 SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_segments *b,
                                               const kernel_local_pairs *whole, vm rays, const vf reach[2], int type)
 {
