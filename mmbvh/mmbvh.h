@@ -4,8 +4,8 @@
  * The nodes are stored in one array, root first. Siblings are adjacent, so that one reference is enough for both. A
  * leaf holds at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32,
  * rounded outward from the double values; in the compact layout, bounds are rounded further outward to a grid. Ghost
- * cells are not in the tree. A cell with a non-finite value has the empty range (+inf, -inf), so that no traversal
- * visits it.
+ * cells and flat cells (without volume, grid_is_flat()) are not in the tree. A cell with a non-finite value has the
+ * empty range (+inf, -inf), so that no traversal visits it.
  *
  * Nodes are numbered depth first by pairs: a pair of siblings, then the descendants of the left one, then those of the
  * right one. The leaves' cells are stored in the same order. Children therefore come after parents, and the descendants

@@ -1,4 +1,4 @@
-/* Runs sweeps over a tree, and computes ranges for new values. */
+/* Runs sweeps (bottom-up passes, mmbvh_sweep.h) over a tree, and computes the nodes' ranges for new values. */
 #include "mmbvh_sweep.h"
 
 #include <omp.h>

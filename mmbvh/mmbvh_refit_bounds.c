@@ -1,4 +1,4 @@
-/* Computes the bounds of a tree's nodes, during the build or for moved vertices. */
+/* Computes the bounding boxes of a tree's nodes, for a new tree or after the mesh's vertices have moved. */
 #include <string.h>
 
 #include "mmbvh_bounds.h"
@@ -8,8 +8,9 @@
 
 enum {
     PREFETCH_CELLS = 48,
-    VISIBLE_NODES = 16 /* maximum number of nodes that are swept at once if invisible nodes are skipped; with fewer,
-                          checking visibility costs more than skipping saves */
+    VISIBLE_NODES = 16 /* if invisible nodes are skipped: groups of at most this many nodes are computed without
+                          checking the visibility of each node, because the checks would cost more than skipping
+                          saves */
 };
 
 static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *outside_grid,

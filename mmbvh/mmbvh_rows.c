@@ -1,6 +1,6 @@
-/* Each row of cells lies between four rows of vertices (two in two dimensions). In a first pass, the range of the
- * values of the four vertices at each position along the rows is computed. A cell lies between two neighbouring
- * positions, so that its range is the union of the ranges at these two positions. */
+/* In a lattice (structured grid) each row of cells lies between four rows of vertices (two in two dimensions). In a
+ * first pass, the range of the values of the four vertices at each position along the rows is computed. A cell lies
+ * between two neighbouring positions, so that its range is the union of the ranges at these two positions. */
 #include "mmbvh_rows.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* Computes the ranges of a lattice's cells, one row at a time. Neighbouring cells of a row share half of their
- * vertices, and the values of a row of vertices are contiguous in memory. */
+/* Computes the ranges of the values of the cells of a lattice (structured grid), one row at a time. Neighbouring cells
+ * of a row share half of their vertices, and the values of a row of vertices are contiguous in memory. */
 #ifndef MMBVH_ROWS_H
 #define MMBVH_ROWS_H
 

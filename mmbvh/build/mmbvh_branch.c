@@ -1,8 +1,9 @@
-/* Each node is a task. A node of many items processes them in chunks, which are tasks too. First the chunks fill bins;
- * the merged bins do not depend on the order of merging. After the plane has been chosen, each chunk is partitioned in
- * place. Items of the left child are called left items. Their total number is the index of the border between both
- * sides. The number of right items in front of the border equals the number of left items behind it. These items are
- * swapped, in order.
+/* Splits the top nodes of a SAH tree in parallel. Each node is an OpenMP task. If a node has many items (cells,
+ * mmbvh_item.h), they are processed in chunks, which are tasks too. First each chunk is sorted into bins, which are
+ * then merged; the result does not depend on the order of merging. After the plane has been chosen, each chunk is
+ * partitioned in place. Items of the left child are called left items. Their total number is the index of the border
+ * between both sides. The number of right items in front of the border equals the number of left items behind it. These
+ * items are swapped, in order.
  *
  *      chunk 0        chunk 1        chunk 2
  *     | l l l r r r | l l r r r r | l l l l r r |

@@ -1,9 +1,9 @@
-/* The cells of a lattice are already in spatial order: cells in a box of indices are also close to each other in space,
- * unless the lattice is strongly deformed. Each node is split in two halves, across the axis along which its box is
- * longest; lengths are estimated from the mean edge lengths of cells. If the numbers of cells per side are powers of
- * two, halving alone would end in leaves of 2 x 2 x 1 cells, although a leaf may have MMBVH_MAX_LEAF = 7. Small boxes
- * are therefore split so that the cost of their leaves is minimal, which mostly gives leaves of 3 x 2 x 1 cells: a
- * third fewer nodes, with a tenth less surface area. */
+/* The cells of a lattice (structured grid) are already in spatial order: cells in a box of indices are also close to
+ * each other in space, unless the lattice is strongly deformed. Each node is split in two halves, across the axis along
+ * which its box is longest; lengths are estimated from the mean edge lengths of cells. If the numbers of cells per side
+ * are powers of two, halving alone would end in leaves of 2 x 2 x 1 cells, although a leaf may have MMBVH_MAX_LEAF = 7.
+ * Small boxes are therefore split so that the cost of their leaves is minimal, which mostly gives leaves of 3 x 2 x 1
+ * cells: a third fewer nodes, with a tenth less surface area. */
 #include "mmbvh_bricks.h"
 
 #include <math.h>

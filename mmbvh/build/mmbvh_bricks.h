@@ -1,4 +1,5 @@
-/* Builds trees over the cells of a lattice by halving boxes of indices. Nothing is sorted, and no cell is read. */
+/* Builds trees over the cells of a lattice (structured grid) by halving boxes of cell indices. Nothing is sorted, and
+ * no cell is read. */
 #ifndef MMBVH_BRICKS_H
 #define MMBVH_BRICKS_H
 

@@ -1,7 +1,7 @@
-/* The tree over all cells of a lattice is built by halving boxes of indices (mmbvh_bricks.c). Any other tree is built
- * in three steps. First the boxes of all cells are quantized to 16 bytes each, or their Morton keys are computed (2 × 8
- * bytes). Then the topology is built, which has no bounds and takes 4 bytes per node. Finally the nodes are written;
- * the sweeps of a refit compute their bounds and ranges.
+/* The tree over all cells of a lattice (structured grid) is built by halving boxes of indices (mmbvh_bricks.c). Any
+ * other tree is built in three steps. First the boxes of all cells are quantized to 16 bytes each, or their Morton keys
+ * are computed (2 × 8 bytes). Then the topology is built: the links between nodes, without bounds, in 4 bytes per node.
+ * Finally the nodes are written, and bottom-up passes (mmbvh_sweep.h) compute their bounds and ranges.
  *
  * Peak memory in bytes per cell: 16 for items or keys, 4 for each topology node (0.35 nodes per tet), and 4 for the
  * cell indices in the finished tree. The items are freed before the nodes are allocated. */
@@ -23,7 +23,8 @@ enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 /* The settings, buffers and counters of one build. */
 typedef struct build {
     bounds_source source;
-    /* indices of the cells to use, none of which is a ghost or flat; NULL: all cells that are neither */
+    /* indices of the cells to use, none of which is a ghost or flat (without volume, grid_is_flat()); NULL: all cells
+     * that are neither */
     const uint32_t *selected;
     int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
@@ -90,7 +91,7 @@ static void count_cells(build *b)
     b->count = b->starts[FILL_CHUNKS];
 }
 
-/* ---- boxes or keys ---------------------------------------------------------------------------------------------- */
+/* ---- bounding boxes or Morton keys of cells --------------------------------------------------------------------- */
 
 static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exact)
 {
@@ -165,7 +166,7 @@ static void quantize_in_tight_bounds(build *b)
     if (is_estimate_too_large(&guess, &exact)) quantize_cells(b, &exact);
 }
 
-/* ---- topology --------------------------------------------------------------------------------------------------- */
+/* ---- links between nodes ---------------------------------------------------------------------------------------- */
 
 static void free_buffers(build *b)
 {

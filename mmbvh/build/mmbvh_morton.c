@@ -102,9 +102,11 @@ static inline uint64_t encode_box_centre(const bounds_source *source, const mort
     return encode_morton_steps(coder, steps);
 }
 
-/* Maps the centre of a box of floats, in the source's coordinates, to steps of the Morton code. */
+/* Maps the centre of a box of floats, in the source's coordinates, to integer coordinates in the grid of the Morton
+ * code. */
 typedef struct sum_mapping {
-    /* step of a centre along each axis: (centre - origin) * factor, limited to last_step */
+    /* integer coordinate of a centre on each axis: (centre - origin) * factor, rounded down and clamped to 0 ..
+     * last_step */
     vec4 origin, factor, last_step;
 } sum_mapping;
 
@@ -119,7 +121,7 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
     return m;
 }
 
-/* Returns the Morton code of a box of floats. A NaN coordinate is mapped to step 0. */
+/* Returns the Morton code of a box of floats. NaN is mapped to the integer coordinate 0. */
 static inline uint64_t encode_float_box(const sum_mapping *m, const morton_coder *coder,
                                         const fetch_float_box *float_box)
 {

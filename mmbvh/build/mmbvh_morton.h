@@ -8,12 +8,13 @@
 
 enum { MORTON_PART_BITS = 7, MORTON_PARTS = 3, MORTON_AXIS_BITS = MORTON_PART_BITS * MORTON_PARTS };
 
-/* Converts positions to Morton keys. A key has the Morton code in its high bits and the cell's index in the index_bits
- * low ones, so that no two keys are equal. */
+/* Converts positions to Morton keys. A grid divides each axis into a power of two of equal steps; a code interleaves
+ * the bits of the three integer coordinates in this grid. A key has the code in its high bits and the cell's index in
+ * the index_bits low ones, so that no two keys are equal. */
 typedef struct morton_coder {
     double origin[3];
-    double factor[3];    /* number of code steps per unit length on each axis */
-    double last_step[3]; /* index of the last code step on each axis */
+    double factor[3];    /* number of grid steps per unit length on each axis */
+    double last_step[3]; /* largest integer coordinate on each axis */
     int index_bits;
     int code_bits;
     uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* lookup tables that spread an axis's bits over the code */

@@ -1,6 +1,7 @@
-/* Items are partitioned in place. Therefore the items of a node are always contiguous, and their final order depends
- * only on their initial order. If a node is so small that the grid is too coarse for its items, as in meshes whose cell
- * sizes differ by orders of magnitude, the boxes are computed anew from the vertices, in steps of a finer grid. */
+/* The items of a node (its cells, mmbvh_item.h) are partitioned in place. Therefore they are always contiguous, and
+ * their final order depends only on their initial order. If a node is so small that the grid is too coarse for its
+ * items, as in meshes whose cell sizes differ by orders of magnitude, the boxes are computed anew from the vertices, in
+ * steps of a finer grid. */
 #include "mmbvh_subtree.h"
 
 /* Minimum number of grid steps along the longest side of a node's box; with fewer, rounding changes surface areas by

@@ -33,7 +33,8 @@ static inline topology_link topology_inner(int64_t left)
 
 /* The buffer in which a thread builds the links of a subtree. */
 typedef struct topology_scratch {
-    topology_link *links; /* capacity is 2 TOPOLOGY_SUBTREE_CELLS, enough for all nodes below the root */
+    topology_link *links; /* has room for two nodes per cell of the largest subtree, enough for all nodes below its
+                             root */
     int64_t count;
 } topology_scratch;
 

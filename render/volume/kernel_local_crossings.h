@@ -54,8 +54,8 @@ SIMD_INLINE void kernel_local_store_row(const float (*first)[SIMD_WIDTH], int fi
 }
 
 /* Reads, per lane, the slopes and origins of the tile's rays in the first and last column and row of the lane's cell.
- * ends: these columns and rows (kernel_local_pixels()). The first index of the results is 0 for columns and 1 for rows.
- */
+ * ends: these columns and rows (kernel_local_pixels()). The first index of the results is 0 for columns and 1 for rows,
+ * the second index 0 for the first and 1 for the last. */
 SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], vf slope[2][2],
                                       vf origin[2][2])
 {

@@ -149,7 +149,7 @@ typedef struct kernel_local_chord {
 typedef struct kernel_local_places {
     float u, width;     /* u: position at which the part begins; width: its length, as a share of the whole interval */
     vf r[5][3], off[5]; /* r: reference coordinates; off: the field minus the chord of the whole interval */
-    vf residual; /* largest residual at places 1 to 3 of this part and of the larger parts that contain it */
+    vf residual;        /* largest residual at places 1 to 3 of this part and of the larger parts that contain it */
     vm is_known;        /* rays for which Newton's method found all reference coordinates */
 } kernel_local_places;
 
@@ -169,8 +169,8 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
     return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
 }
 
-/* Computes the chords between the ends of the rays' intervals, and gathers the numbers of their cells. lane: the lane
- * that holds each ray's cell. */
+/* Computes the lines and chords between the ends of the rays' intervals, and gathers coefficients and limits of the
+ * rays' cells (kernel_local_chord). lane: the lane that holds each ray's cell. */
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds, vi lane,
                                        const kernel_point ends[2], int type, kernel_local_chord *out)
 {

@@ -196,8 +196,9 @@ static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places
                                                  const vf reach[2], float share);
 
 /* Adds the segments of the rays' intervals. An interval is halved, and its parts again, until the error bounds allow a
- * part to be divided into a few equal segments (kernel_local_choose_segment_counts()). The shortest parts for which
- * they do not allow it are passed on: from vectors of cells to packets, and from packets to bisection in double. */
+ * part to be divided into a few equal segments (kernel_local_choose_segment_counts()). The shortest parts for which the
+ * error bounds do not allow this are passed on: from vectors of cells to packets, and from packets to bisection in
+ * double. */
 SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
                                                const kernel_local_chord *chord, const kernel_local_pairs *whole,
                                                vm rays, int type)

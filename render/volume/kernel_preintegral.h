@@ -17,8 +17,9 @@
  * - c0| U / 4. If c deviates from the chord between c0 and c1 by at most b, the error grows by b U.
  *
  * The deviation b from a chord over an interval of values of width h, from low to high: a knot at x at which the slope
- * of the colour changes by k adds at most k (x - low) (high - x) / h. The sum over knots at distances d is at most k
- * (h^2 / (6 d) + h / 4). At the ends of the colour table, beyond which colours are constant, a knot adds k h / 4 more.
+ * of the colour changes by k adds at most k (x - low) (high - x) / h. The sum over all knots between low and high, if
+ * neighbouring knots have the distance d, is at most k (h^2 / (6 d) + h / 4). At the ends of the colour table, beyond
+ * which colours are constant, a knot adds k h / 4 more.
  *
  * The tables. S and K are exact at the borders of bins and linear within a bin. In a bin of width w over which the
  * extinction varies by o (maximum minus minimum), the extinction that S implies has an error of at most o, and S / w of
@@ -223,10 +224,11 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
 }
 
 /* Computes the light of one segment per ray, without what lies in front of it, within the allowed error; *light is
- * undefined on other rays. *begin: the position in the table of the value at which the previous segments ended; it is
- * replaced if this segment begins with another value. *end becomes the position of this segment's end. The caller
- * passes it as `begin` for the next segment. Both results are written in place, because gcc 12 copies structs of
- * vectors through memory: copying *end would take 4 %, and *light 11 % of a frame of tets (AVX2). */
+ * undefined on other rays. *begin: the position in the table of the value at which the previous segments ended; if
+ * this segment begins with another value, that value is looked up instead. *end becomes the position of the value at
+ * this segment's end. The caller passes it as `begin` for the next segment. Both results are written in place, because
+ * gcc 12 copies structs of vectors through memory: copying *end would take 4 %, and *light 11 % of a frame of tets
+ * (AVX2). */
 SIMD_INLINE void kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                       kernel_preint_end *begin, kernel_preint_end *end, kernel_light *light)
 {

@@ -32,8 +32,8 @@
 /* The fragment to which the samples or segments of a ray are being added from front to back, one ray per lane. */
 typedef struct kernel_blend {
     vm open; /* rays that have such a fragment */
-    /* t_first, t_last: depths at which the fragment begins and ends; contact_in, contact_out: ends of the interval, in
-     * its cell, that contains the last sample (kernel_frame.needs_contact) */
+    /* t_first, t_last: depths at which the fragment begins and ends; contact_in, contact_out: depths at which the ray
+     * enters and leaves the cell of the last sample (set only if kernel_frame.needs_contact is) */
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
     /* used for segments: the fragment's optical depth, -ln(transmittance), and the accumulated rounding errors of its
@@ -58,13 +58,13 @@ typedef struct kernel_samples {
     int first, count; /* number of the window's first sample, and number of samples in the window */
     float pad;        /* error bound of sample numbers that are computed from depths */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
-    /* depths of the ends of the ray's interval, in its cell, that contains the sample; set only if the frame
-     * needs_contact */
+    /* depths at which the ray enters and leaves the cell that contains the sample; set only if
+     * kernel_frame.needs_contact is */
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP];
     vf overlap_depth; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
     kernel_blend blend;
-    /* active rays of the packet at its begin, saved here because p->active is reduced to rays that still receive light
-     */
+    /* rays of the packet that were active before the first window; saved here because p->active is reduced to rays that
+     * still receive light */
     vm active;
 } kernel_samples;
 
@@ -121,7 +121,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     if (!p->frame->job->separate_samples) {
         mask = vm_and(mask, vf_lt(t, s->overlap_depth));
         s->overlap_depth = vf_select(mask, t, s->overlap_depth);
-        /* marks the fragment for render_fold.h */
+        /* render_fold() treats fragments of the kind FRAGMENT_LATE as marks of overlapping cells */
         const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero;
         const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
         const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, sign};
@@ -213,9 +213,9 @@ SIMD_INLINE void kernel_emit_separate(kernel_packet *p, kernel_blend *b, vm has,
     b->open = vm_or(b->open, has);
 }
 
-/* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added. A transparent
- * surface lies between the two, or another rank's surface may lie there, because the sample's cell does not touch that
- * of the previous sample. */
+/* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added. These are rays
+ * with a transparent surface between the previous sample and sample n, and rays on which another rank's surface may lie
+ * there, because the cells of the two samples do not touch. */
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples *s, int n, const kernel_hits *hits,
                                    vf t)
 {

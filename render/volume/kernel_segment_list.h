@@ -50,7 +50,8 @@ typedef struct kernel_segments {
     /* Depth at which segments are cut: at an opaque surface. Segments that compositing mixes with other volumes are cut
      * only at clips, not at this rank's surfaces, so that they are the same on any partition. */
     vf t_cut;
-    /* active rays of the packet at its begin, saved here because p->active is reduced to rays that have not ended */
+    /* rays of the packet that were active before the first window; saved here because p->active is reduced to rays that
+     * have not ended */
     vm active;
 } kernel_segments;
 
@@ -118,7 +119,7 @@ static void kernel_items_sort(kernel_segments *list, int lane)
     }
 }
 
-/* Sets the light of unsorted segments to none on the ray in `lane`. */
+/* Resets the accumulated light of unsorted segments (kernel_segments.unsorted_light) on the ray in `lane`. */
 SIMD_INLINE void kernel_unsorted_light_clear(kernel_light *unsorted_light, int lane)
 {
     for (int a = 0; a < 3; a++) unsorted_light->colour[a][lane] = 0;
@@ -253,7 +254,7 @@ static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WI
     return row_count;
 }
 
-/* ---- parts of segments ---- */
+/* ---- division of segments for compositing ---- */
 
 /* Maximum number of equal parts into which a segment is divided for mixing. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };

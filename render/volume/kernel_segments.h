@@ -46,8 +46,8 @@
 
 /* ---- blending a ray's segments ---- */
 
-/* Returns t_out minus the error bound of crossings of faces. An interval that begins in front of this depth certainly
- * begins in front of t_out. render_fold.c uses the same margin. */
+/* Returns t_out minus the error bound of the depths at which rays cross faces. An interval whose computed begin is less
+ * than this depth certainly begins in front of t_out. render_fold.c uses the same margin. */
 SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
     return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;

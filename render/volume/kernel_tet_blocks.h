@@ -48,8 +48,9 @@ static inline void kernel_block_rays_begin(kernel_block_rays *r, const kernel_fr
 }
 
 /* Returns the blocks in which rays may cross the tet in the given lane. The edge function at a block's middle has a
- * rounding error of at most the edge's bound. So has the function on a ray, whether it is computed from the line or
- * from projected vertices; hence twice the bound. Comparisons with NaN keep the block. */
+ * rounding error of at most tets->bound of the edge. The edge function on a ray has a rounding error of at most the
+ * same bound, whether it is computed from the line's coefficients or from projected vertices; hence twice the bound is
+ * added. Comparisons with NaN keep the block. */
 SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_transformed_tets *tets, int lane)
 {
     unsigned blocks = 0;

@@ -41,8 +41,8 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
-    /* set if edge functions of hexes, wedges and pyramids on the packets' rays are computed from lines
-     * (kernel_packet.is_pencil), which must then be computed for each cell */
+    /* set if the packets compute edge functions of hexes, wedges and pyramids from the edges' lines (affine functions
+     * of the rays' parameters; kernel_packet.is_pencil); the lines must then be computed for each cell */
     bool is_pencil;
     /* Processes a cell with the rays of the packet with this index: the polyhedron c or, if c is NULL, the tile's
      * current cell (kernel_tile_cells.cell), a hex, wedge or pyramid. */
@@ -59,7 +59,8 @@ typedef struct kernel_volume_method {
     void (*finish)(kernel_tile_trace *t, int type);
 } kernel_volume_method;
 
-/* Returns the blocks that contain pixels of the box, which is packed as in kernel_tile_candidate. */
+/* Returns the mask of the tile's blocks that contain pixels of the box. The box is packed as in
+ * kernel_tile_candidate.box. */
 SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
 {
     const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
@@ -67,7 +68,7 @@ SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
     return kernel_blocks_at((2u << x1) - (1u << x0), (2u << y1) - (1u << y0));
 }
 
-/* Returns the bounding box of the blocks' pixels, packed as in kernel_tile_candidate.box. */
+/* Returns the bounding box of the pixels of the blocks in the mask, packed as in kernel_tile_candidate.box. */
 SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 {
     int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
@@ -84,7 +85,7 @@ SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 
 /* ---- SIMD_WIDTH tets at once ---- */
 
-/* Sets f of the transformed tets to the values in the transfer function's domain. */
+/* Converts the values at the tets' vertices to the transfer function's domain, and stores them as transformed->f. */
 SIMD_INLINE void kernel_transformed_set_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
@@ -455,7 +456,7 @@ SIMD_INLINE void kernel_volume_trees(kernel_tile_trace *t, unsigned blocks)
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_volume_parts(t, 0, &part, 1, blocks);
 }
 
-/* ---- cells found before, as candidates of the tile ---- */
+/* ---- cells found by a search over the whole picture (candidates) ---- */
 
 /* Partitions the items by their least depth: no item before the returned index is farther than the others. There is at
  * least one item before the index and one from it on. */
@@ -578,7 +579,7 @@ SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
     }
 }
 
-/* ---- windows of depth ---- */
+/* ---- one window (interval of depths) ---- */
 
 /* Processes all cells of a volume that may overlap the window in one of the given blocks. */
 static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_trace *t, int volume, unsigned blocks)
@@ -591,7 +592,7 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
     kernel_tile_process_queues(t);
 }
 
-/* ---- windows of depth ---- */
+/* ---- preparation of a tile ---- */
 
 /* Returns the blocks that the bounding box of at least one tree may meet, and the least and greatest depth of these
  * boxes. */

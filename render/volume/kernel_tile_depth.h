@@ -24,7 +24,7 @@
 #include "kernel_samples.h"
 #include "simd.h"
 
-/* Begins a run of tiles: for its first tile no earlier tile's depth is known. */
+/* Begins a run of tiles: for its first tile, no depth is known at which an earlier tile became dark. */
 SIMD_INLINE void kernel_depth_reset(kernel_tile_volume *d)
 {
     d->dark = INFINITY;
@@ -58,7 +58,8 @@ SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);
 }
 
-/* Takes into account how much light is left on a packet's rays after the window. */
+/* Adds the light that is left on a packet's rays after the window to the counts and extremes that *d collects per
+ * window. */
 SIMD_INLINE void kernel_depth_add_packet(kernel_tile_volume *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);
@@ -72,7 +73,8 @@ SIMD_INLINE void kernel_depth_add_packet(kernel_tile_volume *d, vm rays, const k
     d->last_dark = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last_dark);
 }
 
-/* Updates the expected depth after all rays of a window have been added. depth: the depth of that window. */
+/* Updates the estimates of the depth at which the tile becomes dark, after kernel_depth_add_packet() has been called
+ * for all packets of a window. depth: length of that window in units of t. */
 SIMD_INLINE void kernel_depth_end_window(kernel_tile_volume *d, float depth)
 {
     const bool fades = d->brightest > 0 && d->brightest < 0.9f * d->before;

@@ -39,8 +39,8 @@
 
 /* ---- cells ---- */
 
-/* Adds the segments of a packet's rays in a polyhedron, between the depths reach[0] and reach[1]: the linear pieces of
- * their profiles (kernel_polyhedron.h), on which the field is exactly linear. */
+/* Adds the segments of a packet's rays in a polyhedron, between the depths reach[0] and reach[1]: one for each linear
+ * piece of the field along a ray, which is piecewise linear in a polyhedron (kernel_polyhedron.h). */
 static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, const polyhedron *c, const vf reach[2])
 {
     kernel_tile_segments *s = t->thread->tile_segments;
@@ -184,7 +184,7 @@ SIMD_INLINE void kernel_ray_segments_begin_volume(kernel_packet *p, kernel_segme
 }
 
 /* Deactivates rays that have ended or are dark (have less light left than KERNEL_DARK). Returns the least depth at
- * which the window of another ray begins; +inf if there are no other rays. */
+ * which the window of a ray that is still active begins; +inf if no ray is active. */
 SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                              int count)
 {

@@ -64,7 +64,7 @@ static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedr
         kernel_polyhedron_interval_fill(p, &t->thread->tile_volume->packets[packet], &r);
 }
 
-/* ---- tets: the results are bit-identical for listed pairs and packets ---- */
+/* ---- tets: pairs from the list and whole packets give bit-identical samples ---- */
 
 /* Emits samples as fragments of their own: those that also lie in another cell or, with separate_samples (render.h),
  * all samples. lanes: mask of the lanes that hold such a sample; places: position of each ray among the tile's packets;
@@ -223,8 +223,9 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    /* Hexes, wedges and pyramids are not sampled in lanes if the frame has surfaces, because these may end rays, and
-     * need the ends of intervals in cells (kernel_blend_breaks()); nor if each sample becomes a fragment of its own. */
+    /* Hexes, wedges and pyramids are sampled one sample per lane, except in two cases: if the frame has surfaces, which
+     * may end rays, and because of which kernel_blend_breaks() needs the ends of intervals in cells; and if each sample
+     * becomes a fragment of its own. */
     const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);

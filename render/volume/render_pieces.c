@@ -1,16 +1,16 @@
-/* Divides the values of a transfer function into pieces at cuts: at every point of the opacity, and at every entry of
- * the colour table that does not lie on a line with its neighbours. Opacity and colour are linear between the cuts,
- * exactly as documented.
+/* Divides the values of a transfer function into pieces. The cuts between pieces are the values of all control points
+ * of the opacity, and of all entries of the colour table that do not lie on a line with their neighbours. Opacity and
+ * colour are linear between the cuts, exactly as documented.
  *
- * A ramp that is straight along a logarithmic scale is curved along the values. It is divided into pieces whose
- * extinction has a relative error of at most e. The effect on a pixel does not grow with the path through the medium: a
- * pixel is C = int T s c dt + T_end B, with the transmittance T up to the depth t, the extinction s, the colour c, and
- * the background B behind the transmittance T_end. A change ds of s changes C by dC = int T ds (c - b) dt, where b is
- * the light from behind t. With |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), where R is the contrast
- * of colours. If the ramp rises from an opacity of 0, the relative error of a piece from the value v to (1 + h) v is h
- * / 2; farther up, at a distance g from the ramp's begin along the logarithmic scale, it is h^2 / (8 g). So sqrt(g / 2
- * e) pieces suffice, and halving makes at most twice as many. Over 12 decades that is 105 pieces for e = 1.25e-3, and
- * 370 for 1e-4. */
+ * A ramp is the opacity between two neighbouring control points. If it is linear along a logarithmic scale, it is not
+ * linear in the value. It is then divided into pieces whose extinction has a relative error of at most e. The effect on
+ * a pixel does not grow with the path through the medium: a pixel is C = int T s c dt + T_end B, with the transmittance
+ * T up to the depth t, the extinction s, the colour c, and the background B behind the transmittance T_end. A change ds
+ * of s changes C by dC = int T ds (c - b) dt, where b is the light from behind t. With |ds| <= e s that is at most e R
+ * int T s dt = e R (1 - T_end), where R is the contrast of colours. If the ramp rises from an opacity of 0, the
+ * relative error of a piece from the value v to (1 + h) v is h / 2; farther up, at a distance g from the ramp's begin
+ * along the logarithmic scale, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes at most twice as
+ * many. Over 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
 #include "render_pieces.h"
 #include "kernel_bound.h"
 #include "kernel_types.h"
@@ -75,7 +75,7 @@ typedef struct kept_entry {
     double place;
 } kept_entry;
 
-/* ---- ramps along a nonlinear scale ---- */
+/* ---- opacities that are linear along a nonlinear scale of values ---- */
 
 /* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
@@ -98,8 +98,8 @@ static double ramp_value(const render_transfer *t, int ramp, double share)
 }
 
 /* Returns whether the relative error of the extinction exceeds the tolerance if the part of the ramp becomes one piece.
- * It is largest at an end with opacity 0, but the first of the tested positions is 1/32 of the part away from it; the
- * factor 1.1 covers that. */
+ * The relative error is largest at an end of the part with opacity 0, but the tested position nearest to that end is
+ * 1/32 of the part away from it; the factor 1.1 covers the difference. */
 static bool is_bent(const render_transfer *t, int ramp, double low, double high, double tolerance)
 {
     enum { PLACES = 32 };
@@ -246,7 +246,7 @@ static void set_piece(const render_transfer *t, const kept_entry *entries, kerne
     set_colours(t, entries, middle, begin, piece);
 }
 
-/* ---- bins and steps ---- */
+/* ---- search table of pieces; steps of the opacity ---- */
 
 /* Fills the table by which the piece of a value is found. */
 static void fill_bins(kernel_pieces *out)
@@ -317,8 +317,9 @@ static void unite_variations(value_variation *a, const value_variation *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the ranges of g and of the extinction so that they hold between the values `from` and `to` of the piece p,
- * too. behind: the minimum and maximum of the light from behind. */
+/* Widens the ranges of g (the change of light per unit of field error, defined above) and of the extinction so that
+ * they include those between the values `from` and `to` of the piece p. behind: the minimum and maximum of the light
+ * from behind. */
 static void variation_in_piece(value_variation *variation, const kernel_real *p, double from, double to,
                                const double behind[2])
 {
@@ -345,9 +346,10 @@ static void variation_in_piece(value_variation *variation, const kernel_real *p,
     }
 }
 
-/* Computes the ranges of g over a bin of values, and a little beyond its ends; the first and the last bin include
- * everything beyond them. piece: index of a piece, in front of which no piece reaches the bin. Returns the index of the
- * first piece that reaches the bin, from which the search for the next bin's pieces begins. */
+/* Computes the ranges of g (the change of light per unit of field error, defined above) and of the extinction over a
+ * bin of values, and a little beyond its ends; the first and the last bin include all values beyond the table. piece:
+ * index of a piece, in front of which no piece reaches the bin. Returns the index of the first piece that reaches the
+ * bin, from which the search for the next bin's pieces begins. */
 static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
                             value_variation *variation)
 {
@@ -366,7 +368,8 @@ static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const do
     return piece;
 }
 
-/* Computes a row of the table of bounds (KERNEL_LIGHT_VARIATION etc.) from the ranges of g. */
+/* Computes the bounds over a range of values (KERNEL_LIGHT_VARIATION etc.), for the table of bounds, from the ranges of
+ * g and of the extinction over these values. */
 static void sum_up_variation(const value_variation *s, double contrast, float out[KERNEL_LIGHT_ENTRIES])
 {
     double variation = 0, cost = 0;
@@ -380,9 +383,9 @@ static void sum_up_variation(const value_variation *s, double contrast, float ou
     out[KERNEL_LIGHT_STEEPNESS] = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30);
 }
 
-/* Fills the table of bounds. Its rows are classes of the widths of ranges of values, its columns the bins in which
- * ranges begin. A range of the class `width` that begins anywhere in bin `first` ends in bin `wanted` or in front of
- * it. */
+/* Fills the table of bounds over ranges of values (kernel_pieces.variations). Its rows are classes of the widths of
+ * ranges, its columns the bins in which ranges begin. A range of the class `width` that begins anywhere in bin `first`
+ * ends in bin `wanted` or in front of it. */
 static void fill_variations(kernel_pieces *out, const double behind[2])
 {
     value_variation bins[KERNEL_VARIATION_BINS];

@@ -147,8 +147,9 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
     }
 }
 
-/* Computes the integrals and ranges of all bins. Below the first and above the last knot the function is constant; each
- * of these infinite ranges is represented by one bin. low: value at which the other bins begin; count: their number. */
+/* Computes the integrals and ranges of all bins. Below the first and above the last cut between its pieces the transfer
+ * function is constant; each of these two infinite ranges is represented by one bin. low: value at which the other bins
+ * begin; count: their number. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
     /* The last argument and result of get_cached_extinction(). -1 is never an argument, so that the cache is empty at
@@ -222,9 +223,9 @@ static double store_bin_integrals(kernel_preintegral *out, const bin_sums *bins,
 }
 
 /* Computes out->bend_square and out->bend, which limit the deviation of colours from chords (kernel_preintegral.h), for
- * tables whose entries are unevenly spaced in the domain. It assumes the largest change of slope at the closest
- * spacing. The changes of slope towards the constant colours beyond the ends count too, because the ends need not be at
- * 0 and 1. */
+ * colour tables whose entries are unevenly spaced in the domain. The limits hold even if the largest change of slope
+ * occurred at entries with the smallest spacing. The changes of slope towards the constant colours beyond the ends
+ * count too, because the ends need not be at 0 and 1. */
 static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
