@@ -67,9 +67,9 @@ enum { KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
 /* Share of the allowed error of light that the residual of Newton's method may cause. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Upper bound of the rounding of a ray's values in float32, relative to max(1, |value|). It is added to the errors of
- * the field if the opacity has narrow ramps. docs/development/error_budget.md derives at most 4e-7; this is ten times
- * as much. */
+/* Upper bound of the rounding of a ray's values in float32, relative to max(1, |value|). This bound is added to the
+ * error of the field if the opacity has narrow ramps. docs/development/error_budget.md derives at most 4e-7; this is
+ * ten times as much. */
 #define KERNEL_VALUE_ROUNDING 4e-6f
 
 /* ---- cells ---- */

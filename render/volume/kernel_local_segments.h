@@ -64,8 +64,8 @@ typedef struct kernel_tile_segments {
 /* ---- surfaces that cut segments ---- */
 
 /* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
- * none. It works ray by ray, and is used if rays may cross more transparent surfaces than kernel_hits stores. places:
- * position of each ray among the tile's packets. */
+ * none. The function works ray by ray, and is used only if rays may cross more transparent surfaces than kernel_hits
+ * stores. places: position of each ray among the tile's packets. */
 static __attribute__((noinline, cold)) vf
 kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
 {

@@ -8,13 +8,14 @@
  * number of knots between them. Neighbouring segments share an end.
  *
  * How much of E the segment itself absorbs. If the colour c were E / D on the whole segment, the light would be A E /
- * D, with the absorption A = 1 - exp(-D). That exceeds the segment's light by the integral of c (m - exp(-t)) dt over
- * the optical depth t from 0 to D, with m = A / D. The bracket is negative first, then positive. So among all c whose
- * values have a range of width R, the integral is largest if c jumps from its minimum to its maximum where the bracket
- * is zero. It is then R (1 - m + m ln m), or with u = 1 - m: R u^2 (1 / 2 + u / 6 + u^2 / 12 + ...) <= R U / 2, U = u^2
- * (1 + u). If c is linear in the value, from c0 to c1, it is monotone in t however the depth is distributed, so that
- * the excess is between 0 and (c1 - c0) U / 2. Half of that is subtracted from the light, and the error is at most |c1
- * - c0| U / 4. If c deviates from the chord between c0 and c1 by at most b, the error grows by b U.
+ * D, with the absorption A = 1 - exp(-D). This A E / D exceeds the segment's light by the integral of c (m - exp(-t))
+ * dt over the optical depth t from 0 to D, with m = A / D. The bracket is negative first, then positive. So among all c
+ * whose values have a range of width R, the integral is largest if c jumps from its minimum to its maximum where the
+ * bracket is zero. The integral is then R (1 - m + m ln m), or with u = 1 - m: R u^2 (1 / 2 + u / 6 + u^2 / 12 + ...)
+ * <= R U / 2, U = u^2 (1 + u). If c is linear in the value, from c0 to c1, it is monotone in t however the depth is
+ * distributed, so that the excess is between 0 and (c1 - c0) U / 2. Half of that is subtracted from the light, and the
+ * error is at most |c1 - c0| U / 4. If c deviates from the chord between c0 and c1 by at most b, the error grows by b
+ * U.
  *
  * The deviation b from a chord over an interval of values of width h, from low to high: a knot at x at which the slope
  * of the colour changes by k adds at most k (x - low) (high - x) / h. The sum over all knots between low and high, if

@@ -75,8 +75,9 @@ SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
 }
 
 /* Sets the window to the samples with numbers first .. first + count - 1, and computes the error bound s->pad. A number
- * computed from a depth t has three roundings; a depth computed from a number m has two, of step * m and of t. So the
- * two differ by at most 6e-8 (4 m + t / step), and t / step is at most m + base / step. */
+ * computed from a depth t has three rounding errors; a depth computed from a number m has two, of step * m and of t. So
+ * the number computed from the depth of sample m differs from m by at most 6e-8 (4 m + t / step), and t / step is at
+ * most m + base / step. */
 SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
 {
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));

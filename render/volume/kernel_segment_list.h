@@ -42,8 +42,9 @@ typedef struct kernel_segments {
     const kernel_hits *cut;      /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
     int volume;                  /* index of the volume */
     const kernel_pieces *pieces; /* the volume's transfer function */
-    /* above 0: segments are emitted as fragments, which compositing mixes with other volumes (kernel_emit_segment()),
-     * and this is the allowed error of light; 0: segments are integrated here */
+    /* above 0: segments are emitted as fragments, which compositing mixes with those of other volumes
+     * (kernel_emit_segment()), and `mixing` is the error of light that this may cause; 0: segments are integrated
+     * here */
     float mixing;
     kernel_blend blend;
     vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
@@ -67,8 +68,8 @@ SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pix
 }
 
 /* Returns for each ray the depth of the first transparent surface at or behind `from` (only behind if `beyond` is set),
- * by a search of all of the tile's fragments; +inf if there is none. It is used if a ray crosses more transparent
- * surfaces than kernel_hits stores. */
+ * by a search of all of the tile's fragments; +inf if there is none. The search is used only if a ray crosses more
+ * transparent surfaces than kernel_hits stores. */
 static vf kernel_next_cut_by_search(const kernel_packet *p, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -213,8 +214,8 @@ static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kern
 
 /* Sorts the segments of all rays by t_in. Element n of the results belongs to the n-th segment of each ray: the depth
  * at which it begins (begins[n]; +inf if the ray has fewer segments), and the index of its first float in list->items
- * (items[n]). Returns the largest number of segments of a ray. It uses insertion sort, because the segments are nearly
- * sorted already: the traversal is front to back. */
+ * (items[n]). Returns the largest number of segments of a ray. The method is insertion sort, because the segments are
+ * nearly sorted already: the tree is traversed front to back. */
 static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WINDOW], vi items[KERNEL_WINDOW])
 {
     enum { FLOATS = sizeof list->items[0][0] / sizeof(float) };

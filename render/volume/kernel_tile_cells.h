@@ -478,8 +478,8 @@ static inline int kernel_partition_by_depth(kernel_tile_candidate *items, int co
     }
 }
 
-/* Sorts the items by their least depth: by quicksort down to ranges of a few items, and these by insertion. It recurses
- * only into the shorter range, so that the stack stays small. */
+/* Sorts the items by their least depth: by quicksort down to ranges of a few items, and these by insertion. The
+ * function recurses only into the shorter range, so that the call stack stays small. */
 static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };

@@ -1,9 +1,9 @@
 /* Samples volumes for a whole tile, one window at a time, for all blocks of the tile. A window is a range of sample
  * numbers, which is the same on all of the tile's rays. Hexes, wedges and pyramids are processed one sample per lane
  * (kernel_local_samples.h), and tets one ray-tet pair per lane (kernel_tets.h). Other cells are read and transformed,
- * and their edge functions computed, once per window (kernel_tile_cells.h). They are passed to the packets of the
- * blocks that they may meet, which set the values of the samples that lie in them. A window has at most
- * job->sample_group samples:
+ * and their edge functions computed, once per window (kernel_tile_cells.h). Each of these cells is passed to the
+ * packets of the blocks that it may meet, and the packets set the values of the samples that lie in the cell. A window
+ * has at most job->sample_group samples:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
