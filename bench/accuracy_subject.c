@@ -116,7 +116,7 @@ double accuracy_compute_box_size(const grid *g, int64_t cell)
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
         double p[3];
-        grid_vertex(g, vertex, p);
+        grid_read_vertex_position(g, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             low[axis] = fmin(low[axis], p[axis]);
             high[axis] = fmax(high[axis], p[axis]);

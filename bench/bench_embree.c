@@ -238,7 +238,7 @@ static struct RTCBuildPrimitive compute_cell_box(const grid *cells, int64_t cell
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
         double p[3];
-        grid_vertex(cells, vertex, p);
+        grid_read_vertex_position(cells, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             low[axis] = fmin(low[axis], p[axis]);
             high[axis] = fmax(high[axis], p[axis]);

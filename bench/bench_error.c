@@ -74,7 +74,7 @@ static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
         double world[3], pixel[2];
-        grid_vertex(cells, vertex, world);
+        grid_read_vertex_position(cells, vertex, world);
         project_to_pixel(&all->camera, world, pixel);
         for (int axis = 0; axis < 2; axis++) {
             low[axis] = fmin(low[axis], pixel[axis] - 1);
@@ -113,7 +113,7 @@ static void copy_wanted_cells(bench_pixels *all, const grid *cells, const unsign
         all->types[at] = (unsigned char)grid_cell_type(cells, cell);
         all->offsets[at + 1] = all->offsets[at] + end - first;
         for (int64_t i = first; i < end; i++)
-            all->connectivity[all->offsets[at] + i - first] = grid_array_index(&cells->connectivity, i);
+            all->connectivity[all->offsets[at] + i - first] = grid_read_index(&cells->connectivity, i);
         at++;
     }
     all->kept = *cells;

@@ -59,7 +59,8 @@ static void copy_hits(lit *l)
     l->open = require_memory(realloc(l->open, most * sizeof *l->open));
     l->count = 0;
     for (int64_t i = 0; i < l->scene.fragments.count; i++)
-        l->count += render_hit_of(&l->scene.job, &l->scene.fragments.items[i], &l->hits[l->count], &l->rays[l->count]);
+        l->count += render_make_hit_from_fragment(&l->scene.job, &l->scene.fragments.items[i], &l->hits[l->count],
+                                                  &l->rays[l->count]);
 }
 
 static int count_ray_bits(const render_hit_rays *rays)
@@ -76,7 +77,7 @@ static void list_rays(lit *l, kind *k)
     k->theirs = require_memory(realloc(k->theirs, (size_t)(k->rays + 1) * sizeof *k->theirs));
     bench_embree_ray *to = k->list;
     for (int64_t i = 0; i < l->count; i++) {
-        render_hit_samples(job, &l->hits[i], start, directions);
+        render_compute_hemisphere_rays(job, &l->hits[i], start, directions);
         for (int n = 0; n < count_ray_bits(&l->rays[i]); n++, to++)
             for (int a = 0; a < 3; a++) {
                 to->origin[a] = (float)start[a];
@@ -101,7 +102,7 @@ static void measure_kind(lit *l, kind *k, const render_occluders *occluders, int
     copy_hits(l);
     memcpy(l->open, l->rays, (size_t)l->count * sizeof *l->open);
     const double began = bench_start_timer();
-    if (render_occlude(occluders, l->hits, l->open, l->count, &l->scene.error)) exit_with_error(l);
+    if (render_clear_blocked_rays(occluders, l->hits, l->open, l->count, &l->scene.error)) exit_with_error(l);
     bench_stop_timer(began, number, &k->trace);
     count_rays(l, k);
     if (!l->routes.embree) return;

@@ -15,7 +15,7 @@
 static comp_load make_load(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);
-    const comp_grid grid = comp_grid_of(1920, 1080, ranks);
+    const comp_grid grid = comp_make_grid(1920, 1080, ranks);
     return (comp_load){(int64_t)(2 * covered * layers / ranks), 11, comp_grid_block_pixels(&grid)};
 }
 
@@ -36,10 +36,10 @@ int main(int argc, char **argv)
         const comp_nodes nodes = {counts[i] % node == 0 ? node : 1, false};
         const comp_load load = make_load(counts[i]);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
-            const comp_route route = comp_route_of(s, counts[i], nodes, 8);
+            const comp_route route = comp_make_route(s, counts[i], nodes, 8);
             print_costs(comp_schedule_name(s), &route, &load);
         }
-        const comp_route best = comp_cheapest_route(counts[i], nodes, &load, &comp_default_machine);
+        const comp_route best = comp_find_fastest_route(counts[i], nodes, &load, &comp_default_machine);
         print_costs("chosen", &best, &load);
     }
     return 0;

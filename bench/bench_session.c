@@ -122,7 +122,7 @@ static float *make_velocities(const grid *g, double shift)
 #pragma omp parallel for schedule(static)
     for (int64_t v = 0; v < g->vertex_count; v++) {
         double p[3];
-        grid_vertex(g, v, p);
+        grid_read_vertex_position(g, v, p);
         for (int i = 0; i < 3; i++)
             out[3 * v + i] = (float)(sin(6 * (p[(i + 2) % 3] + shift)) + cos(6 * (p[(i + 1) % 3] + shift)));
     }
@@ -145,7 +145,7 @@ static void make_states(bench_session *s)
 #pragma omp parallel for schedule(static)
     for (int64_t v = 0; v < count; v++) {
         double p[3];
-        grid_vertex(g, v, p);
+        grid_read_vertex_position(g, v, p);
         for (int axis = 0; axis < 3; axis++)
             s->coordinates[1][axis][v] = (float)(p[axis] + sway * sin(3 * p[(axis + 1) % 3]));
         s->values[1][v] = (float)test_wave_field((const double[]){p[0] + 0.01, p[1] + 0.02, p[2] + 0.03});
@@ -160,7 +160,7 @@ static void describe_mesh_and_field(bench_session *s)
     s->mesh.vertex_count = g->vertex_count;
     s->mesh.cell_count = g->cell_count;
     s->mesh.cell_type = (insitu_cell_type)g->cell_type;
-    s->mesh.connectivity_count = g->cell_count * grid_type_vertices(g->cell_type);
+    s->mesh.connectivity_count = g->cell_count * grid_type_vertex_count(g->cell_type);
     s->mesh.connectivity = (insitu_array){.data = g->connectivity.data, .type = INSITU_INT32};
     insitu_field_defaults(&s->field);
     s->field.name = "f";

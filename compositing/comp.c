@@ -62,8 +62,8 @@ static void choose_message_route(composition *c, int64_t fragments)
     const comp_group *g = c->group;
     const comp_load load = {fragments, expected_bytes, comp_grid_block_pixels(&c->grid)};
     c->route = g->schedule == COMP_AUTOMATIC
-                   ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_default_machine)
-                   : comp_route_of(g->schedule, c->route.ranks, g->nodes, DEFAULT_RADIX);
+                   ? comp_find_fastest_route(c->route.ranks, g->nodes, &load, &comp_default_machine)
+                   : comp_make_route(g->schedule, c->route.ranks, g->nodes, DEFAULT_RADIX);
     if (g->max_dense_ranks) c->route.max_dense_ranks = g->max_dense_ranks;
     c->statistics->schedule = c->route.schedule;
 }
@@ -72,7 +72,7 @@ static void choose_owners(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
-    comp_route_assign_positions(&c->route, claims, c->grid.blocks);
+    comp_convert_claims_to_places(&c->route, claims, c->grid.blocks);
     comp_claims_balance(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
@@ -86,14 +86,14 @@ static void claim_blocks(composition *c)
     comp_claim *const claims = c->group->claims->items;
     const uint32_t ranges = c->strips.starts[c->grid.strips];
     for (uint32_t r = 0; r < ranges; r++)
-        claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
+        claims[comp_find_block_of_strip(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         claims[b].priority = comp_claim_priority(b, c->transport.rank, claims[b].fragments);
 }
 
 /* Allocates the memory for exchanging and merging fragments. Also finds this rank's fragments in each strip of the
  * picture, and computes this rank's claims to own blocks of pixels. */
-static insitu_status allocate_phases(composition *c, fragment_list *items, base_error *error)
+static insitu_status allocate_phase_memory(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
     if (c->out->deep) c->merged.deep = base_calloc((size_t)c->grid.threads, sizeof *c->merged.deep);
@@ -112,17 +112,17 @@ static insitu_status allocate_phases(composition *c, fragment_list *items, base_
 
 /* Merges the fragments of the pixels that this rank owns, including those in *held, which other ranks have sent. Rank 0
  * stores the finished pixels in the picture, and other ranks store them in *finished, as messages. */
-static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
-                                 insitu_status status, base_error *error)
+static insitu_status merge_fragments_of_own_pixels(composition *c, const comp_messages *held, comp_messages *finished,
+                                                   insitu_status status, base_error *error)
 {
     const double start = MPI_Wtime();
-    const int place = comp_route_position(&c->route, c->transport.rank);
+    const int place = comp_find_place_of_rank(&c->route, c->transport.rank);
     comp_owned owned = {.traced_strips = &c->strips, .owners = &c->owners, .place = place};
     c->merged.out = place == 0 ? c->out : NULL;
     if (!status && place < c->route.owners) {
-        const int parent = place ? comp_route_rank(&c->route, comp_gather_parent(&c->route, place)) : 0;
-        status = comp_received_find(&c->grid, place, held, &owned.arrivals, error);
-        if (!status) status = comp_owned_merge(&owned, &c->merged, parent, finished, error);
+        const int parent = place ? comp_find_rank_at_place(&c->route, comp_gather_parent(&c->route, place)) : 0;
+        status = comp_received_list_sheets(&c->grid, place, held, &owned.arrivals, error);
+        if (!status) status = comp_merge_owned_strips(&owned, &c->merged, parent, finished, error);
         comp_received_free(&owned.arrivals);
     }
     c->statistics->merge_ms = milliseconds_since(start);
@@ -131,7 +131,8 @@ static insitu_status merge_owned(composition *c, const comp_messages *held, comp
 
 static insitu_status merge_on_single_rank(composition *c, base_error *error)
 {
-    return merge_owned(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK, error);
+    return merge_fragments_of_own_pixels(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK,
+                                         error);
 }
 
 static void free_fragments(fragment_list *items)
@@ -145,7 +146,7 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     comp_messages held = {NULL, NULL}, finished = {NULL, NULL};
     const comp_canvas canvas = {&c->grid, c->merged.background, c->out};
     insitu_status status = comp_exchange(&c->transport, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
-    status = merge_owned(c, &held, &finished, status, error);
+    status = merge_fragments_of_own_pixels(c, &held, &finished, status, error);
     comp_messages_free(&held);
     free_fragments(items);
     status = comp_gather(&c->transport, &c->route, &canvas, &finished, status, error);
@@ -166,8 +167,8 @@ static insitu_status begin_composite(composition *c, fragment_list *items, int t
         free_fragments(items);
         return status;
     }
-    c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
-    c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height, ranks);
+    c->route = comp_make_route(COMP_DIRECT, ranks, c->group->nodes, 0);
+    c->grid = comp_make_grid((uint32_t)c->out->width, (uint32_t)c->out->height, ranks);
     c->grid.threads = threads > 0 ? threads : omp_get_max_threads();
     memset(c->group->claims->items, 0, c->grid.blocks * sizeof *c->group->claims->items);
     return INSITU_OK;
@@ -175,7 +176,7 @@ static insitu_status begin_composite(composition *c, fragment_list *items, int t
 
 /* Sends the samples of a deep picture to rank 0, or drops them if an error occurred. The samples were made by the
  * owners of the pixels. The lists of samples are freed. */
-static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
+static insitu_status gather_deep_samples(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
     if (!status) {
@@ -197,7 +198,7 @@ static insitu_status composite_fragments(composition *c, fragment_list *items, i
     const MPI_Comm comm = c->group->comm;
     statistics->sent_fragments = items->count;
     int64_t most = items->count;
-    insitu_status own = allocate_phases(c, items, error), status = own;
+    insitu_status own = allocate_phase_memory(c, items, error), status = own;
     if (c->route.ranks > 1) status = comp_agree_claims(comm, own, &most, c->group->claims, (int)c->grid.blocks, error);
     if (!status) {
         if (c->route.ranks > 1) choose_message_route(c, most);
@@ -212,7 +213,7 @@ static insitu_status composite_fragments(composition *c, fragment_list *items, i
     base_free(c->owners.places);
     base_free(c->loads);
     free_fragments(items);
-    return c->out->deep ? gather_deep(c, status, error) : status;
+    return c->out->deep ? gather_deep_samples(c, status, error) : status;
 }
 
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
@@ -236,7 +237,7 @@ static insitu_status share_overlaps(const composition *c, comp_overlaps *overlap
     const int bytes = (int)pixel_set_bytes(pixel_count(c));
     const MPI_Comm comm = c->group->comm;
     const insitu_status status =
-        comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, c->merged.overlaps, bytes, MPI_BYTE, MPI_BOR, comm), error);
+        comp_convert_mpi_error(MPI_Allreduce(MPI_IN_PLACE, c->merged.overlaps, bytes, MPI_BYTE, MPI_BOR, comm), error);
     if (!status) *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, pixel_count(c)), c->merged.overlaps};
     return status;
 }

@@ -43,7 +43,7 @@ comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, con
     return cost;
 }
 
-comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine)
+comp_route comp_find_fastest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine)
 {
     static const struct {
         comp_schedule schedule;
@@ -53,10 +53,10 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
     /* If all ranks are on one node, a round within the node would already bring all fragments to their owners, so that
      * no schedule needs to distinguish nodes. */
     if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false};
-    comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
+    comp_route best = comp_make_route(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_estimate_cost(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {
-        const comp_route route = comp_route_of(tried[i].schedule, ranks, nodes, tried[i].radix);
+        const comp_route route = comp_make_route(tried[i].schedule, ranks, nodes, tried[i].radix);
         const double seconds = comp_estimate_cost(&route, load, machine).seconds;
         if (!(seconds < least)) continue;
         best = route;
@@ -65,7 +65,7 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
     return best;
 }
 
-int64_t comp_route_messages(const comp_route *route, int place)
+int64_t comp_count_route_messages(const comp_route *route, int place)
 {
     if (place >= route->owners) return 1;
     int64_t messages = 0;

@@ -37,11 +37,11 @@ typedef struct comp_cost {
 comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, const comp_machine *machine);
 
 /* Returns the route with the lowest estimated time. */
-comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
+comp_route comp_find_fastest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
 /* Returns the number of messages that a rank sends in all rounds of the route, if every partner sends to every other in
  * each round and no message must be divided because of its length. place: the rank's number in the order of ranks by
  * nodes (comp_route.h). */
-int64_t comp_route_messages(const comp_route *route, int place);
+int64_t comp_count_route_messages(const comp_route *route, int place);
 
 #endif

@@ -44,7 +44,7 @@ static void add_interval(void *state, const fragment *f)
     list->samples[list->sample_count++] = sample;
 }
 
-void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded)
+void comp_deep_add_pixel(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded)
 {
     const int64_t first = list->sample_count;
     void *items = list->pixels;
@@ -152,7 +152,7 @@ static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
 }
 
 /* Allocates space on rank 0 for the pixels and samples of all ranks. Their numbers must be in in->counts. */
-static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *error)
+static insitu_status allocate_sample_buffers(deep_inbox *in, deep_image *out, base_error *error)
 {
     int64_t pixels = 0, samples = out->count;
     for (int rank = 0; rank < in->ranks; rank++) {
@@ -191,19 +191,19 @@ static insitu_status count_all_samples(MPI_Comm comm, const comp_deep_list *list
     const insitu_status status =
         comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, NULL, error);
     if (status) return status;
-    return comp_mpi_status(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
+    return comp_convert_mpi_error(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
 }
 
 static insitu_status gather_lists(MPI_Comm comm, int rank, const comp_deep_list *lists, int list_count, deep_inbox *in,
                                   deep_image *out, base_error *error)
 {
     insitu_status status = count_all_samples(comm, lists, list_count, in, error);
-    if (!status && rank == 0) status = open_inbox(in, out, error);
+    if (!status && rank == 0) status = allocate_sample_buffers(in, out, error);
     status = comp_agree(comm, status, NULL, error);
     if (status) return status;
     if (rank == 0) copy_own_samples(out, lists, list_count);
     const int code = rank == 0 ? receive_all(comm, in, out) : send_lists(comm, lists, list_count);
-    return comp_agree(comm, comp_mpi_status(code, error), NULL, error);
+    return comp_agree(comm, comp_convert_mpi_error(code, error), NULL, error);
 }
 
 insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,

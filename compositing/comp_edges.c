@@ -46,7 +46,7 @@ static void mark_differing_pixel_pairs(const unsigned char *differ, int64_t pixe
 
 /* Compares each pixel of row y with the pixel to its right and with the three nearest pixels of the next row, and marks
  * both pixels of each pair that differs. `differ` is a buffer of 4 bytes per pixel. */
-static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
+static void mark_edge_pixels_of_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;
     const float *row = picture->rgba + 4 * width * y, *next = row + 4 * width;
@@ -75,7 +75,7 @@ bool comp_find_edges(const image *picture, int threads, unsigned char *pixels)
 #pragma omp for schedule(dynamic) nowait
             for (int64_t block = 0; block < blocks; block++)
                 for (int64_t y = block * ROWS; y < (block + 1) * ROWS && y < picture->height; y++)
-                    mark_row(picture, y, differ + 4 * width * block, marks);
+                    mark_edge_pixels_of_row(picture, y, differ + 4 * width * block, marks);
             region_leave();
         }
         for (int64_t p = 0; p < count; p++)

@@ -45,7 +45,7 @@ static void divide_blocks(comp_grid *g)
 /* Divides the picture into blocks that are nearly square, and as small as possible without exceeding COMP_TARGET_BLOCKS
  * blocks. If there are many ranks, blocks are divided further, until there are enough for every rank or a block is one
  * row of a strip. */
-comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
+comp_grid comp_make_grid(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
     const int counted = ranks < COMP_COUNTED_RANKS_MAX ? ranks : COMP_COUNTED_RANKS_MAX;
@@ -78,7 +78,7 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 
 /* Stores in loads[r] the number of fragments in the blocks that rank r owns. Returns the mean of these numbers over the
  * ranks that own blocks, rounded up. */
-static uint64_t compute_equal_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
+static uint64_t compute_mean_owner_load(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;
     for (int r = 0; r < ranks; r++) loads[r] = 0;
@@ -123,7 +123,7 @@ static int find_new_owner(owner_search *t, uint64_t fragments)
 
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
-    owner_search t = {claims, blocks, 0, 4, loads, compute_equal_share(claims, blocks, loads, ranks)};
+    owner_search t = {claims, blocks, 0, 4, loads, compute_mean_owner_load(claims, blocks, loads, ranks)};
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;
         const uint64_t fragments = claims[b].fragments;

@@ -29,7 +29,7 @@ typedef struct comp_grid {
 
 /* Returns the grid of a picture for this number of ranks. width × height must be at least 1 and at most UINT32_MAX. The
  * grid's number of threads is set to 1. */
-comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks);
+comp_grid comp_make_grid(uint32_t width, uint32_t height, int ranks);
 
 /* Returns the maximum number of blocks of a picture for this number of ranks. */
 static inline uint32_t comp_max_blocks(int ranks)
@@ -45,28 +45,28 @@ static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
     return (uint32_t)COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
 }
 
-static inline uint32_t comp_grid_block(const comp_grid *grid, uint32_t strip)
+static inline uint32_t comp_find_block_of_strip(const comp_grid *grid, uint32_t strip)
 {
     if (grid->blocks == grid->strips) return strip;
     const uint32_t y = strip / grid->strips_per_row, x = strip - y * grid->strips_per_row;
     return (y >> grid->shift_y) * grid->blocks_across + (x >> grid->shift_x);
 }
 
-static inline uint32_t comp_grid_y(const comp_grid *grid, uint32_t pixel)
+static inline uint32_t comp_find_row_of_pixel(const comp_grid *grid, uint32_t pixel)
 {
     return grid->inverse ? (uint32_t)((unsigned __int128)pixel * grid->inverse >> 64) : pixel;
 }
 
-static inline uint32_t comp_grid_strip(const comp_grid *grid, uint32_t pixel)
+static inline uint32_t comp_find_strip_of_pixel(const comp_grid *grid, uint32_t pixel)
 {
-    const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
+    const uint32_t y = comp_find_row_of_pixel(grid, pixel), x = pixel - y * grid->width;
     return (y >> grid->row_shift) * grid->strips_per_row + x / COMP_LANES;
 }
 
 /* Returns the pixel's index in its strip; pixels of a strip are numbered row by row. */
 static inline uint32_t comp_grid_index_in_strip(const comp_grid *grid, uint32_t pixel)
 {
-    const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
+    const uint32_t y = comp_find_row_of_pixel(grid, pixel), x = pixel - y * grid->width;
     return (y & ((1u << grid->row_shift) - 1)) * COMP_LANES + x % COMP_LANES;
 }
 
@@ -75,7 +75,7 @@ typedef struct comp_area {
     uint32_t x, y, width, height;
 } comp_area;
 
-static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
+static inline comp_area comp_find_strip_area(const comp_grid *grid, uint32_t strip)
 {
     const uint32_t x = strip % grid->strips_per_row * COMP_LANES, y = strip / grid->strips_per_row << grid->row_shift;
     const uint32_t right = grid->width - x, below = grid->height - y, rows = 1u << grid->row_shift;
@@ -83,7 +83,7 @@ static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
 }
 
 /* Returns the pixel of the picture that has this index in the strip. */
-static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, uint32_t index_in_strip)
+static inline uint32_t comp_find_pixel_of_strip(const comp_grid *grid, uint32_t strip, uint32_t index_in_strip)
 {
     const uint32_t x = strip % grid->strips_per_row * COMP_LANES, y = strip / grid->strips_per_row << grid->row_shift;
     return (y + index_in_strip / COMP_LANES) * grid->width + x + index_in_strip % COMP_LANES;

@@ -98,7 +98,7 @@ typedef struct sample_pass {
     int64_t counted; /* number of samples of this volume that are blended, so far */
 } sample_pass;
 
-static bool is_counted(sample_pass *pass, const fragment *sample)
+static bool select_sample_for_blending(sample_pass *pass, const fragment *sample)
 {
     const uint32_t layer = sample->kind / FRAGMENT_LAYER, ends = sample->kind % FRAGMENT_LAYER;
     if (layer != pass->layer) *pass = (sample_pass){.layer = layer};
@@ -112,11 +112,11 @@ static bool is_counted(sample_pass *pass, const fragment *sample)
 }
 
 /* Returns whether two of the samples belong to the same volume. */
-static bool are_of_one_volume(const fragment *samples, int64_t count)
+static bool have_two_samples_of_one_volume(const fragment *samples, int64_t count)
 {
     sample_pass pass = {0};
     for (int64_t i = 0; i < count; i++)
-        if (is_counted(&pass, &samples[i]) && pass.counted > 1) return true;
+        if (select_sample_for_blending(&pass, &samples[i]) && pass.counted > 1) return true;
     return false;
 }
 
@@ -146,7 +146,7 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
         if (is_surface) before = find_furthest_end_before(sorted, &next, f->t_in, before);
         if (f->t_in <= (is_surface ? before : reach) && f->t_out >= f->t_in) return true;
         if (f->transmittance == 0) return false;
-        if (n > 1 && are_of_one_volume(f, n)) return true;
+        if (n > 1 && have_two_samples_of_one_volume(f, n)) return true;
         if (!is_surface && f->t_out > reach) reach = f->t_out;
     }
     return false;
@@ -158,7 +158,7 @@ static fragment mix_samples(const fragment *samples, int64_t count)
     double colour[3] = {0, 0, 0}, weight = 0, absorbed = 0;
     sample_pass pass = {0};
     for (int64_t i = 0; i < count; i++) {
-        if (!is_counted(&pass, &samples[i])) continue;
+        if (!select_sample_for_blending(&pass, &samples[i])) continue;
         const double own = 1 - (double)samples[i].transmittance;
         for (int c = 0; c < 3; c++) colour[c] += (double)samples[i].colour[c];
         weight += own;
@@ -311,8 +311,8 @@ static void blend_single(const fragment *f, const float background[4], float out
 
 /* Blends the fragments of a pixel, sorted front to back, over the background. Not inlined, because inlining would slow
  * down pixels with a single fragment, which are frequent and do not need this function. */
-static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
-                                                   float out_rgba[4], float *out_depth)
+static __attribute__((noinline)) void
+sort_and_blend_fragments(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
 {
     static const interval_sink no_sink = {NULL, NULL};
     heap_sort(items, count);
@@ -379,7 +379,7 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
     if (count == 1)
         blend_single(items, background, out_rgba, out_depth);
     else
-        blend_sorted(items, count, background, out_rgba, out_depth);
+        sort_and_blend_fragments(items, count, background, out_rgba, out_depth);
 }
 
 void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)

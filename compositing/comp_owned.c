@@ -24,7 +24,7 @@ typedef struct merge_scratch {
     uint16_t mixed[COMP_ROWS]; /* for each row of the strip, the bit mask of the pixels that have several fragments
                                   to be blended; bit i is column i */
     /* For each pixel in the masks `mixed`: counts is the number of its fragments, and ends the index in `listed` behind
-     * its last fragment. list_mixed_pixels() reduces ends to the index of the pixel's first fragment. */
+     * its last fragment. list_fragments_to_blend() reduces ends to the index of the pixel's first fragment. */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;
@@ -44,7 +44,7 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* Marks a pixel as mixed: all of its fragments will be listed, and merged by comp_merge_pixel(). Does nothing if the
  * pixel is marked already. The fragment that m->joined contains for the pixel is counted as its first fragment. */
-static void mark_mixed(merge_scratch *m, uint32_t at)
+static void mark_pixel_for_blending(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
     if (m->mixed[at / COMP_LANES] & bit) return;
@@ -58,7 +58,7 @@ static bool add_remaining_fragment(merge_scratch *m, const fragment *item, uint3
     if (left->count == left->capacity && !reserve_fragments(left, left->count + 256)) return false;
     left->items[left->count] = *item;
     left->items[left->count++].pixel = at;
-    mark_mixed(m, at);
+    mark_pixel_for_blending(m, at);
     m->counts[at]++;
     return true;
 }
@@ -125,7 +125,7 @@ static bool join_fragments_of_strip(const comp_owned *owned, uint32_t strip, mer
 
 /* Returns the smallest index, at least `from`, of a pixel that is marked in m->mixed; COMP_STRIP_PIXELS if there is
  * none. */
-static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
+static uint32_t find_next_pixel_to_blend(const merge_scratch *m, uint32_t from)
 {
     for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
         const unsigned bits = m->mixed[r] & (r == from / COMP_LANES ? 0xffffu << from % COMP_LANES : 0xffffu);
@@ -136,15 +136,15 @@ static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
 
 /* Copies all fragments of the pixels that are marked in m->mixed to m->listed, sorted by pixel. On return, the
  * fragments of pixel k begin at index ends[k] of this list. Returns false if memory ran out. */
-static bool list_mixed_pixels(merge_scratch *m)
+static bool list_fragments_to_blend(merge_scratch *m)
 {
     uint32_t sum = 0;
-    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
+    for (uint32_t k = find_next_pixel_to_blend(m, 0); k < COMP_STRIP_PIXELS; k = find_next_pixel_to_blend(m, k + 1)) {
         sum += m->counts[k];
         m->ends[k] = sum;
     }
     if (!reserve_fragments(&m->listed, sum)) return false;
-    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1))
+    for (uint32_t k = find_next_pixel_to_blend(m, 0); k < COMP_STRIP_PIXELS; k = find_next_pixel_to_blend(m, k + 1))
         m->listed.items[--m->ends[k]] = comp_sheet_get(&m->joined, k, k);
     for (int64_t i = 0; i < m->remaining.count; i++)
         m->listed.items[--m->ends[m->remaining.items[i].pixel]] = m->remaining.items[i];
@@ -153,10 +153,10 @@ static bool list_mixed_pixels(merge_scratch *m)
 
 /* Marks all pixels with a fragment as if they had several, because the samples of a deep picture are made from the list
  * of the fragments of marked pixels. */
-static void mark_all_mixed(merge_scratch *m)
+static void mark_all_pixels_for_blending(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
-        if (comp_sheet_has(&m->joined, k)) mark_mixed(m, k);
+        if (comp_sheet_has(&m->joined, k)) mark_pixel_for_blending(m, k);
 }
 
 static void store_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
@@ -170,9 +170,9 @@ static void store_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel
 static void blend_pixels_with_several_fragments(const comp_grid *grid, const comp_merge_output *merged,
                                                 merge_scratch *m)
 {
-    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
+    for (uint32_t k = find_next_pixel_to_blend(m, 0); k < COMP_STRIP_PIXELS; k = find_next_pixel_to_blend(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
-                                                   comp_grid_pixel(grid, m->joined.strip, k));
+                                                   comp_find_pixel_of_strip(grid, m->joined.strip, k));
         store_pixel(&m->pixels, k, &pixel);
     }
 }
@@ -183,7 +183,7 @@ static void blend_pixels_with_several_fragments(const comp_grid *grid, const com
  * rank 0 fills them with the background. */
 static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 {
-    const int count = comp_sheet_count(&m->pixels);
+    const int count = comp_sheet_count_pixels(&m->pixels);
     unsigned char *at = comp_writer_reserve(&m->writer, (uint32_t)owned->place,
                                             comp_sheet_max_bytes(count, COMP_PIXEL_WORDS), COMP_MESSAGE_BYTES);
     if (!at) return false;
@@ -195,8 +195,8 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
 {
     if (!join_fragments_of_strip(owned, strip, m)) return false;
     comp_sheet_finish(&m->joined, merged->background, &m->pixels);
-    if (merged->deep) mark_all_mixed(m);
-    if (!list_mixed_pixels(m)) return false;
+    if (merged->deep) mark_all_pixels_for_blending(m);
+    if (!list_fragments_to_blend(m)) return false;
     blend_pixels_with_several_fragments(owned->traced_strips->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
     comp_sheet_store(&m->pixels, owned->traced_strips->grid, merged->background, merged->out);
@@ -216,7 +216,7 @@ static bool merge_strips(const comp_owned *owned, const comp_merge_output *merge
     bool is_ok = m != NULL;
 #pragma omp for schedule(dynamic, 16) nowait
     for (uint32_t s = 0; s < owned->traced_strips->grid->strips; s++) {
-        const int32_t place = owned->owners->places[comp_grid_block(owned->traced_strips->grid, s)];
+        const int32_t place = owned->owners->places[comp_find_block_of_strip(owned->traced_strips->grid, s)];
         if (is_ok && place == owned->place)
             is_ok = merge_strip(owned, s, merged, m);
         else if (is_ok && place < 0 && merged->out)
@@ -225,8 +225,8 @@ static bool merge_strips(const comp_owned *owned, const comp_merge_output *merge
     return is_ok;
 }
 
-insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output *merged, int parent,
-                               comp_messages *finished, base_error *error)
+insitu_status comp_merge_owned_strips(const comp_owned *owned, const comp_merge_output *merged, int parent,
+                                      comp_messages *finished, base_error *error)
 {
     bool is_ok = true;
     *finished = (comp_messages){NULL, NULL};

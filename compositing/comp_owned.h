@@ -19,7 +19,7 @@ typedef struct comp_owned {
 /* Merges all fragments of the strips. If merged->out is not NULL, it receives the pixels, and the background in pixels
  * without fragments. Otherwise *finished receives messages with the pixels for rank `parent`. Local. On an error
  * *finished is empty, and out may contain some of the pixels. */
-insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output *merged, int parent,
-                               comp_messages *finished, base_error *error);
+insitu_status comp_merge_owned_strips(const comp_owned *owned, const comp_merge_output *merged, int parent,
+                                      comp_messages *finished, base_error *error);
 
 #endif

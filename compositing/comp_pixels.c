@@ -24,7 +24,7 @@ comp_pixel comp_pixels_blend(const comp_merge_output *merged, fragment *items, i
         comp_add_overlap(merged->overlaps, pixel);
     if (merged->deep) {
         for (int64_t i = 0; i < count; i++) items[i].pixel = pixel;
-        comp_deep_add(&merged->deep[omp_get_thread_num()], items, count, merged->is_folded);
+        comp_deep_add_pixel(&merged->deep[omp_get_thread_num()], items, count, merged->is_folded);
     }
     return blended;
 }

@@ -8,7 +8,7 @@ static int find_largest_divisor(int number, int most)
     return 1;
 }
 
-static bool has_radices(int number, int most)
+static bool has_only_factors_up_to(int number, int most)
 {
     for (int k = most; k > 1; k--)
         while (number % k == 0) number /= k;
@@ -19,7 +19,7 @@ static bool has_radices(int number, int most)
  * of `number`, because the largest power of two that does not exceed `number` is such a product. */
 static int find_largest_product(int number, int most)
 {
-    while (!has_radices(number, most)) number--;
+    while (!has_only_factors_up_to(number, most)) number--;
     return number;
 }
 
@@ -37,7 +37,7 @@ static void add_route_rounds(comp_route *route, int number, int most)
     }
 }
 
-comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix)
+comp_route comp_make_route(comp_schedule schedule, int ranks, comp_nodes nodes, int radix)
 {
     const bool is_by_nodes = schedule == COMP_NODES || schedule == COMP_RADIX;
     comp_route route = {
@@ -57,14 +57,14 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
     return route;
 }
 
-int comp_route_position(const comp_route *route, int rank)
+int comp_find_place_of_rank(const comp_route *route, int rank)
 {
     if (!route->nodes.is_cyclic) return rank;
     const int count = route->ranks / route->nodes.ranks;
     return rank % count * route->nodes.ranks + rank / count;
 }
 
-int comp_route_rank(const comp_route *route, int place)
+int comp_find_rank_at_place(const comp_route *route, int place)
 {
     if (!route->nodes.is_cyclic) return place;
     const int count = route->ranks / route->nodes.ranks;
@@ -78,11 +78,11 @@ int comp_route_stride(const comp_route *route, int round)
     return stride;
 }
 
-void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks)
+void comp_convert_claims_to_places(const comp_route *route, comp_claim *claims, uint32_t blocks)
 {
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;
-        const int place = comp_route_position(route, comp_priority_rank(claims[b].priority));
+        const int place = comp_find_place_of_rank(route, comp_priority_rank(claims[b].priority));
         claims[b].priority =
             comp_priority_with_rank(claims[b].priority, place < route->owners ? place : place - route->owners);
     }

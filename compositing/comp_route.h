@@ -47,18 +47,18 @@ typedef struct comp_route {
     int round_count;
     int radix[COMP_MOST_ROUNDS]; /* for each round, the number of ranks that exchange fragments with each other */
     /* Largest number of ranks that exchange fragments in a dense round, in which every partner sends to every other.
-     * comp_route_of() sets it to the maximum, COMP_MAX_DENSE_RANKS. */
+     * comp_make_route() sets it to the maximum, COMP_MAX_DENSE_RANKS. */
     int max_dense_ranks;
 } comp_route;
 
 /* Returns the route of a schedule; COMP_AUTOMATIC is not allowed. The schedule COMP_RADIX has rounds of at most `radix`
  * ranks; other schedules ignore `radix`. */
-comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
+comp_route comp_make_route(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* Every rank has a place: its number in an order in which the ranks of a node are consecutive. comp_route_position()
- * returns a rank's place, and comp_route_rank() the rank at a place. */
-int comp_route_position(const comp_route *route, int rank);
-int comp_route_rank(const comp_route *route, int place);
+/* Every rank has a place: its number in an order in which the ranks of a node are consecutive.
+ * comp_find_place_of_rank() returns a rank's place, and comp_find_rank_at_place() the rank at a place. */
+int comp_find_place_of_rank(const comp_route *route, int rank);
+int comp_find_rank_at_place(const comp_route *route, int place);
 
 /* Returns the place value of the round's digit: the product of the radices of earlier rounds. A place is a number with
  * one digit per round; the places of two partners whose digits of this round differ by 1 differ by this value. */
@@ -83,10 +83,10 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
     return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* Each claim contains the rank that owns a block. Replaces this rank by its place (comp_route_position()). If the place
- * is not one of the first ones, which belong to owners, the block is given to the place of the rank's partner, to which
- * the rank sends its fragments before the first round. */
-void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
+/* Each claim contains the rank that owns a block. Replaces this rank by its place (comp_find_place_of_rank()). If the
+ * place is not one of the first ones, which belong to owners, the block is given to the place of the rank's partner, to
+ * which the rank sends its fragments before the first round. */
+void comp_convert_claims_to_places(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */
 const char *comp_schedule_name(comp_schedule schedule);

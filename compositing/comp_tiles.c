@@ -159,7 +159,7 @@ static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const
 
 /* Returns one pixel's fragments as an array: copies them to the thread's buffer, or returns the address of a single
  * fragment in `items`. Returns NULL if memory ran out. */
-static fragment *copy_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
+static fragment *copy_fragments_of_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
     fragment *pixel_fragments = reserve_buffer(&own->pixel_fragments, count, sizeof *pixel_fragments);
@@ -179,7 +179,8 @@ static void blend_pixel(const comp_tiles *tiles, int64_t pixel, fragment *items,
 
 /* Blends and stores a tile whose pixels have at most one fragment each. Returns false if a pixel has two or more; the
  * caller must then store the whole tile anew. */
-static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
+static bool blend_single_fragments_of_tile(const comp_tiles *tiles, const pixel_area *area, fragment *items,
+                                           int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
     unsigned char seen[MOST_PIXELS] = {0};
@@ -197,7 +198,7 @@ static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragm
 static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pixel_area *area, fragment *items,
                        int64_t count)
 {
-    if (blend_singles(tiles, area, items, count)) return true;
+    if (blend_single_fragments_of_tile(tiles, area, items, count)) return true;
     const int64_t pixels = (int64_t)area->width * area->height;
     int64_t *starts = reserve_buffer(&own->starts, pixels + 1, sizeof *starts);
     int64_t *order = reserve_buffer(&own->order, count, sizeof *order);
@@ -210,7 +211,7 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
             store_background(tiles, pixel);
             continue;
         }
-        fragment *collected = copy_pixel(own, items, order + starts[k], own_count);
+        fragment *collected = copy_fragments_of_pixel(own, items, order + starts[k], own_count);
         if (!collected) return false;
         blend_pixel(tiles, pixel, collected, own_count);
     }

@@ -61,7 +61,7 @@ static layer_table make_layers(const wave_grid *grid)
     return t;
 }
 
-INLINE cell_view view_cell(const wave_grid *grid, const wave_cell_shape *shape, int32_t c)
+INLINE cell_view get_cell_view(const wave_grid *grid, const wave_cell_shape *shape, int32_t c)
 {
     cell_view view = {.shape = shape};
     int64_t first_vertex =
@@ -140,12 +140,12 @@ INLINE void integrate_faces(const cell_view *view, const real p[8][4], real inte
         }                                                                                                              \
     }
 
-INLINE void find_jump(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers, real half_step,
-                      int32_t c)
+INLINE void compute_cell_jump(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers,
+                              real half_step, int32_t c)
 {
     const real *state = (const real *)grid->state.values + c * grid->state.stride;
     real *jump = (real *)grid->jump + 4 * (int64_t)c;
-    cell_view view = view_cell(grid, shape, c);
+    cell_view view = get_cell_view(grid, shape, c);
     real p[8][4], integral[4];
     load_vertices(grid, &view, p);
     integrate_faces(&view, p, integral);
@@ -163,7 +163,7 @@ static void find_jumps(const wave_grid *grid, double time_step)
 {
     if (grid->second_order) {
         layer_table layers = make_layers(grid);
-        FOR_EACH_CELL(grid, find_jump, &layers, (real)(0.5 * time_step));
+        FOR_EACH_CELL(grid, compute_cell_jump, &layers, (real)(0.5 * time_step));
         return;
     }
     for (int32_t c = 0; c < grid->own_cells; ++c) {
@@ -210,7 +210,7 @@ INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, cons
 INLINE void apply_flux(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers, real time_step,
                        int32_t c)
 {
-    cell_view view = view_cell(grid, shape, c);
+    cell_view view = get_cell_view(grid, shape, c);
     real p[8][4], mean[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
     int layer = grid->layers[c];
     face_side near = get_face_side(grid, c);

@@ -26,8 +26,8 @@ static wave_setup make_setup(const wave_options *options, const wave_lattice *la
                         .order = options->order,
                         .vertices = options->at_vertices,
                         .swell = options->moving ? options->swell : 0,
-                        .medium = wave_medium_layered(lattice)};
-    setup.source = wave_source_default(lattice, &setup.medium);
+                        .medium = wave_medium_make_layered(lattice)};
+    setup.source = wave_source_make_default(lattice, &setup.medium);
     return setup;
 }
 
@@ -40,7 +40,7 @@ static void run_simulation(const wave_options *options, const wave_mesh *mesh, w
     wave_pictures_open(options, mesh, solver, comm, &pictures);
     for (int step = 1; step <= options->steps; ++step) {
         double begin = MPI_Wtime();
-        wave_pictures_steer(&pictures, &solver->setup.source);
+        wave_pictures_update_source(&pictures, &solver->setup.source);
         wave_solver_step(solver);
         double between = MPI_Wtime();
         insitu_report insitu = wave_pictures_step(&pictures, step, solver->time);
@@ -51,7 +51,7 @@ static void run_simulation(const wave_options *options, const wave_mesh *mesh, w
     wave_pictures_close(&pictures);
 }
 
-static int make_and_run(const wave_options *options, MPI_Comm comm, int rank)
+static int create_mesh_and_run(const wave_options *options, MPI_Comm comm, int rank)
 {
     int ranks;
     MPI_Comm_size(comm, &ranks);
@@ -80,7 +80,7 @@ int main(int argc, char **argv)
     MPI_Init(&argc, &argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     status = read_options(argc, argv, rank, &options);
-    if (status == 0 && !options.help) status = make_and_run(&options, MPI_COMM_WORLD, rank);
+    if (status == 0 && !options.help) status = create_mesh_and_run(&options, MPI_COMM_WORLD, rank);
     MPI_Finalize();
     return status;
 }

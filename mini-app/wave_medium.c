@@ -6,7 +6,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-wave_medium wave_medium_layered(const wave_lattice *lattice)
+wave_medium wave_medium_make_layered(const wave_lattice *lattice)
 {
     static const double share[] = {0.18, 0.4, 0.7, 1.0};
     static const double speed[] = {0.8, 1.1, 1.5, 2.0};
@@ -27,7 +27,7 @@ uint8_t wave_medium_layer(const wave_medium *medium, double z)
     return (uint8_t)layer;
 }
 
-wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *medium)
+wave_source wave_source_make_default(const wave_lattice *lattice, const wave_medium *medium)
 {
     double depth = lattice->origin[2];
     wave_source source = {.position = {0.2 * lattice->origin[0], 0.1 * lattice->origin[1], 0.52 * depth},

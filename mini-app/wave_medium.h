@@ -33,12 +33,12 @@ typedef struct wave_source {
 } wave_source;
 
 /* Returns four layers. Their stiffness and density increase with depth. */
-wave_medium wave_medium_layered(const wave_lattice *lattice);
+wave_medium wave_medium_make_layered(const wave_lattice *lattice);
 
 uint8_t wave_medium_layer(const wave_medium *medium, double z);
 
 /* Returns a source in the third layer, away from the centre. Its pressure has the amplitude 1 at a distance of 0.5. */
-wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *medium);
+wave_source wave_source_make_default(const wave_lattice *lattice, const wave_medium *medium);
 
 double wave_source_rate(const wave_source *source, double time);
 

@@ -87,7 +87,7 @@ static insitu_field describe_speed(const wave_pictures *p, const insitu_mesh *m)
     return f;
 }
 
-static insitu_status pass_arrays(wave_pictures *p)
+static insitu_status pass_arrays_to_session(wave_pictures *p)
 {
     insitu_mesh m = describe_mesh(p);
     insitu_field fields[3] = {describe_field(p, &m, "pressure", 0, 1), describe_field(p, &m, "velocity", 1, 3),
@@ -124,7 +124,7 @@ void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, cons
     if (status != INSITU_OK && pictures->rank == 0) print_once(pictures, "no pictures", insitu_error(NULL));
 }
 
-void wave_pictures_steer(wave_pictures *p, wave_source *source)
+void wave_pictures_update_source(wave_pictures *p, wave_source *source)
 {
     source->strength = 1;
     source->period = 0;
@@ -137,7 +137,7 @@ void wave_pictures_steer(wave_pictures *p, wave_source *source)
 insitu_report wave_pictures_step(wave_pictures *p, int64_t cycle, double time)
 {
     if (!p->session) return (insitu_report){0};
-    if (pass_arrays(p) != INSITU_OK) print_once(p, "handing over", insitu_error(p->session));
+    if (pass_arrays_to_session(p) != INSITU_OK) print_once(p, "handing over", insitu_error(p->session));
     insitu_status status = insitu_step(p->session, cycle, time);
     insitu_report report = *insitu_last_report(p->session);
     p->images += report.images;

@@ -29,7 +29,7 @@ void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, cons
 
 /* Sets the source's strength and period from the scene's parameters, or to 1 and 0 (a single pulse) if the scene has
  * none. Local. */
-void wave_pictures_steer(wave_pictures *pictures, wave_source *source);
+void wave_pictures_update_source(wave_pictures *pictures, wave_source *source);
 
 /* Passes the arrays and draws the images that are due. Returns this rank's report; without a session, all its members
  * are 0. Collective. */

@@ -96,7 +96,7 @@ static void measure_cells(const wave_mesh *mesh, int32_t cell, wave_cell_geometr
     const wave_cell_shape *shape = wave_mesh_cell(mesh, cell, vertex);
     for (int i = 0; i < shape->vertex_count; ++i) {
         id[i] = mesh->vertex_ids[vertex[i]];
-        wave_lattice_vertex(&mesh->partition.lattice, id[i], position[i]);
+        wave_lattice_compute_position(&mesh->partition.lattice, id[i], position[i]);
     }
     wave_cell_measure(shape, (const double(*)[3])position, id, out);
 }
@@ -158,7 +158,7 @@ static bool fill_vertices(wave_solver *s, const double (*centroid)[3])
     int bytes = s->setup.real_bytes;
     double xyz[3];
     for (int32_t v = 0; v < s->mesh->vertices; ++v) {
-        wave_lattice_vertex(&s->mesh->partition.lattice, s->mesh->vertex_ids[v], xyz);
+        wave_lattice_compute_position(&s->mesh->partition.lattice, s->mesh->vertex_ids[v], xyz);
         for (int a = 0; a < 3; ++a) {
             int64_t at = v * s->grid.coordinates.stride + a * s->grid.coordinates.component_stride;
             store_real(s->grid.coordinates.values, bytes, at, xyz[a]);

@@ -117,7 +117,7 @@ static void compute_array_range_any_type(const grid_array *a, int64_t count, int
         region_enter();
 #pragma omp for schedule(static) reduction(min : low) reduction(max : high) nowait
         for (int64_t i = 0; i < count; i++) {
-            const double x = grid_array_number(a, i);
+            const double x = grid_read_number(a, i);
             const bool usable = x - x == 0;
             low = usable && x < low ? x : low;
             high = usable && x > high ? x : high;

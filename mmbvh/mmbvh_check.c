@@ -48,7 +48,7 @@ static insitu_status check_cell_bounds(const check_state *w, int64_t index, int6
     int64_t vertex;
     while (grid_walk_next(&vertices, &vertex)) {
         double p[3];
-        grid_vertex(w->g, vertex, p);
+        grid_read_vertex_position(w->g, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             const double x = (p[axis] - w->tree->origin[axis]) * w->tree->scale;
             if (!(lower[axis] <= x && x <= upper[axis])) {
@@ -61,7 +61,7 @@ static insitu_status check_cell_bounds(const check_state *w, int64_t index, int6
 }
 
 /* Computes the range of the cell's values. Returns false if a value is not finite. */
-static bool cell_range(const check_state *w, int64_t cell, double *low, double *high)
+static bool compute_cell_range(const check_state *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
     int64_t vertex;
@@ -77,7 +77,7 @@ static bool cell_range(const check_state *w, int64_t cell, double *low, double *
     return true;
 }
 
-static void node_range(const check_state *w, int64_t index, float *low, float *high)
+static void get_node_range(const check_state *w, int64_t index, float *low, float *high)
 {
     const mmbvh_ranges own = mmbvh_own_ranges(w->tree);
     memcpy(low, own.low + index * own.stride, sizeof *low);
@@ -87,9 +87,9 @@ static void node_range(const check_state *w, int64_t index, float *low, float *h
 static insitu_status check_cell_range(check_state *w, int64_t index, int64_t cell)
 {
     float range_low, range_high;
-    node_range(w, index, &range_low, &range_high);
+    get_node_range(w, index, &range_low, &range_high);
     double low, high;
-    if (!cell_range(w, cell, &low, &high)) {
+    if (!compute_cell_range(w, cell, &low, &high)) {
         w->unusable++;
         return INSITU_OK;
     }
@@ -131,13 +131,13 @@ static insitu_status check_leaf(check_state *w, int64_t index)
     return INSITU_OK;
 }
 
-static insitu_status check_contained(const check_state *w, int64_t index, int64_t child_index)
+static insitu_status check_child_is_contained(const check_state *w, int64_t index, int64_t child_index)
 {
     float lower[2][4], upper[2][4], low[2], high[2];
     mmbvh_node_box(w->tree, index, lower[0], upper[0]);
     mmbvh_node_box(w->tree, child_index, lower[1], upper[1]);
-    node_range(w, index, &low[0], &high[0]);
-    node_range(w, child_index, &low[1], &high[1]);
+    get_node_range(w, index, &low[0], &high[0]);
+    get_node_range(w, child_index, &low[1], &high[1]);
     for (int axis = 0; axis < 3; axis++) {
         if (!(lower[0][axis] <= lower[1][axis] && upper[1][axis] <= upper[0][axis])) {
             return VIOLATION(w, "node %" PRId64 ": child %" PRId64 " lies outside its bounds", index, child_index);
@@ -171,7 +171,7 @@ static insitu_status check_inner_node(check_state *w, int64_t index)
     }
     w->next_pair += 2;
     for (int side = 0; side < 2; side++) {
-        const insitu_status status = check_contained(w, index, pair + side);
+        const insitu_status status = check_child_is_contained(w, index, pair + side);
         if (status) return status;
     }
     w->overlap += compute_overlap_of_pair(w->tree, index, pair);

@@ -48,15 +48,15 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     if (shape == FETCH_TETS) return 4;
     if (shape == FETCH_HEXES) return 8;
     if (shape == FETCH_LATTICE) return g->cell_type == GRID_HEX ? 8 : 4;
-    return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
+    return grid_type_vertex_count(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
 /* Returns the index of a cell's first entry in the connectivity. A lattice has no connectivity; for a lattice, returns
  * the index of the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first_entry(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
-    if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
-    return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+    if (shape == FETCH_LATTICE) return grid_lattice_first_vertex(g->lattice, cell);
+    return shape == FETCH_BY_CELL && g->offsets.data ? grid_read_index(&g->offsets, cell) : cell * count;
 }
 
 /* Returns the index of the cell's vertex i. `first` is the result of fetch_first_entry() for the cell. */
@@ -340,7 +340,7 @@ static inline bool fetch_can_read_boxes(const grid *g)
 {
     const grid_array *c = g->coordinates;
     const bool is_alike = c[0].stride == c[1].stride && c[0].stride == c[2].stride;
-    return is_alike && !grid_has_faces(g) && fetch_coordinate_numbers(g) != FETCH_ANY_NUMBERS;
+    return is_alike && !grid_may_have_polyhedra(g) && fetch_coordinate_numbers(g) != FETCH_ANY_NUMBERS;
 }
 
 /* Extends the box by a cell of a uniform or rectilinear lattice. Comparisons suffice because the lattice's coordinates
@@ -365,7 +365,7 @@ MMBVH_INLINE void extend_box_by_vertices(fetch_box *box, const grid *g, int64_t 
             const int64_t vertex = grid_walk_vertex(&walk, entry);
             for (int axis = 0; axis < 3; axis++) {
                 const grid_array *c = &g->coordinates[axis];
-                const double x = numbers == FETCH_ANY_NUMBERS ? grid_array_number(c, vertex)
+                const double x = numbers == FETCH_ANY_NUMBERS ? grid_read_number(c, vertex)
                                                               : fetch_number(c, vertex, numbers == FETCH_DOUBLES);
                 all.lower[axis] = x < all.lower[axis] ? x : all.lower[axis];
                 all.upper[axis] = x > all.upper[axis] ? x : all.upper[axis];

@@ -8,7 +8,7 @@
 
 /* Returns half the surface area of a node's box times the number of tests that a ray makes after it has hit the box:
  * one for each cell of a leaf, or two for the boxes of an inner node's children. Lane 3 of the box must be 0. */
-static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
+static inline double compute_weighted_node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;
     const int count = mmbvh_node_count(tree, node);
@@ -18,19 +18,19 @@ static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4
 
 /* Stores the node's box. If the tree's grid cannot represent the box, increments *outside_grid. If s->measures_area,
  * adds the change of the node's area to *area_change. */
-static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4 upper, int64_t *outside_grid,
-                                  double *area_change)
+static inline void store_box_and_measure_area(const sweep *s, int64_t node, vec4 lower, vec4 upper,
+                                              int64_t *outside_grid, double *area_change)
 {
     const mmbvh *tree = s->tree;
     vec4 old[2];
     if (s->measures_area) {
         store_read_box(tree, node, &old[0], &old[1]);
-        *area_change -= node_area(tree, node, old[0], old[1]);
+        *area_change -= compute_weighted_node_area(tree, node, old[0], old[1]);
     }
     *outside_grid += !store_box(tree, node, lower, upper);
     if (s->measures_area) {
         store_read_box(tree, node, &old[0], &old[1]);
-        *area_change += node_area(tree, node, old[0], old[1]);
+        *area_change += compute_weighted_node_area(tree, node, old[0], old[1]);
     }
 }
 
@@ -46,7 +46,8 @@ static inline void store_union_of_children(const sweep *s, int64_t node, int64_t
         for (int side = 0; side < 2; side++)
             if (is_visited[side] && !is_visited[!side]) lower[!side] = lower[side], upper[!side] = upper[side];
     }
-    store_measured(s, node, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]), outside_grid, area_change);
+    store_box_and_measure_area(s, node, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]), outside_grid,
+                               area_change);
 }
 
 #endif

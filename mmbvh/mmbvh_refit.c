@@ -186,7 +186,7 @@ static range compute_range_of_any_leaf(const sweep *s, int64_t ref, int64_t coun
     return round_range_outward(&leaf);
 }
 
-static sweep_sum run_generic(const sweep *s, int64_t first, int64_t end)
+static sweep_sum compute_ranges_of_any_cells(const sweep *s, int64_t first, int64_t end)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
@@ -196,13 +196,13 @@ static sweep_sum run_generic(const sweep *s, int64_t first, int64_t end)
     return (sweep_sum){.count = unusable};
 }
 
-static sweep_sum run_infinite(const sweep *s, int64_t first, int64_t end)
+static sweep_sum set_infinite_ranges(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = first; i < end; i++) set_range(s, i, (range){-INFINITY, INFINITY});
     return (sweep_sum){0};
 }
 
-static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
+static sweep_sum compute_ranges_of_given_boxes(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
@@ -220,7 +220,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
 static bool can_use_specialized(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    return is_float && !field->source_cells && !grid_has_faces(g);
+    return is_float && !field->source_cells && !grid_may_have_polyhedra(g);
 }
 
 bool sweep_reads_floats(const sweep *ranges)
@@ -230,8 +230,8 @@ bool sweep_reads_floats(const sweep *ranges)
 
 static sweep_run choose_sweep_function(const grid *g, const grid_field *field)
 {
-    if (!field) return run_infinite;
-    if (!can_use_specialized(g, field)) return run_generic;
+    if (!field) return set_infinite_ranges;
+    if (!can_use_specialized(g, field)) return compute_ranges_of_any_cells;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 
@@ -248,7 +248,8 @@ sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field,
 
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges)
 {
-    return (sweep){.tree = tree, .run = run_box_ranges, .box_ranges = ranges, .ranges = mmbvh_own_ranges(tree)};
+    return (sweep){
+        .tree = tree, .run = compute_ranges_of_given_boxes, .box_ranges = ranges, .ranges = mmbvh_own_ranges(tree)};
 }
 
 insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options)

@@ -13,8 +13,8 @@ enum {
                           saves */
 };
 
-static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *outside_grid,
-                        double *area_change)
+static void store_box_of_leaf(const sweep *s, int64_t index, int64_t first, int count, int64_t *outside_grid,
+                              double *area_change)
 {
     const mmbvh *tree = s->tree;
     fetch_box box;
@@ -23,8 +23,8 @@ static void store_cells(const sweep *s, int64_t index, int64_t first, int count,
     const uint32_t *cells = tree->cells + first; /* the sweep processes the cells in descending order */
     s->source->extend(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
     round_box_outward(&box, tree->origin, tree->scale, lower, upper);
-    store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0},
-                   outside_grid, area_change);
+    store_box_and_measure_area(s, index, (vec4){lower[0], lower[1], lower[2], 0},
+                               (vec4){upper[0], upper[1], upper[2], 0}, outside_grid, area_change);
 }
 
 static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
@@ -34,7 +34,7 @@ static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
         if (count)
-            store_cells(s, i, ref, count, &sum.count, &sum.area_change);
+            store_box_of_leaf(s, i, ref, count, &sum.count, &sum.area_change);
         else
             store_union_of_children(s, i, ref, &sum.count, &sum.area_change);
     }
@@ -82,7 +82,7 @@ static fetch_box compute_exact_bounds(const mmbvh *tree, const bounds_source *so
 
 /* Computes a new grid and new bounds for a mesh that has moved out of the tree's grid. The new grid has a margin of an
  * eighth of the mesh's size on each side. */
-static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
+static insitu_status recompute_bounds_in_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
     const fetch_box exact = compute_exact_bounds(tree, source, threads);
     float lower[3], upper[3];
@@ -139,7 +139,7 @@ insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh
     tree->area += sum.area_change;
     if (!tree->compact || !(sum.count || (*is_whole && is_grid_too_coarse(tree)))) return INSITU_OK;
     *is_whole = true;
-    return sweep_new_grid(tree, &source, threads);
+    return recompute_bounds_in_new_grid(tree, &source, threads);
 }
 
 insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options)

@@ -93,7 +93,7 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     for (int i = 1; i < count; i++) unite_float_boxes(&all, &float_boxes[i]);
     vec4 lower, upper;
     round_float_box_outward(&all, tree->origin, tree->scale, &lower, &upper);
-    store_measured(s, node, lower, upper, &p->outside_grid, &p->area_change);
+    store_box_and_measure_area(s, node, lower, upper, &p->outside_grid, &p->area_change);
     /* adding 0 makes a negative zero positive, as rounding does for other meshes */
     if (pass.with_values) set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f});
 }
@@ -114,7 +114,7 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
 
 /* Computes the bounds, and ranges if pass.with_values is set, of the nodes from end - 1 down to `first`. These nodes
  * are the root, or two siblings whose descendants are not in the interval and have been processed before. */
-MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
+MMBVH_INLINE void read_and_store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     for (int64_t i = first; i < end; i++) {
         const int count = mmbvh_node_count(s->tree, i);
@@ -124,15 +124,15 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
     }
 }
 
-/* first_cell() returns the index, in mmbvh.cells, of the first cell below a node; end_of_cells() returns one more than
- * the index of the last. */
+/* first_cell() returns the index, in mmbvh.cells, of the first cell below a node; find_end_of_cell_entries_below()
+ * returns one more than the index of the last. */
 static int64_t first_cell(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);
     return mmbvh_node_ref(tree, node);
 }
 
-static int64_t end_of_cells(const mmbvh *tree, int64_t node)
+static int64_t find_end_of_cell_entries_below(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node) + 1;
     return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
@@ -144,9 +144,9 @@ MMBVH_INLINE sweep_sum refit_nodes(const sweep *s, int64_t first, int64_t end, c
     p.unusable = p.outside_grid = 0;
     p.area_change = 0;
     if (end - first <= 2) {
-        run_nodes(s, &p, first, end, pass);
+        read_and_store_nodes(s, &p, first, end, pass);
     } else {
-        read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), pass);
+        read_cells(s, &p, first_cell(s->tree, first), find_end_of_cell_entries_below(s->tree, first + 1), pass);
         store_nodes(s, &p, first, end, pass);
     }
     return (sweep_sum){pass.with_values ? p.unusable : p.outside_grid, p.area_change};

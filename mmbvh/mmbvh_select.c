@@ -235,15 +235,15 @@ MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
-MMBVH_INLINE match_result match_any(const selector *s, int64_t cell, const bool is_packed)
+MMBVH_INLINE match_result match_cell_of_any_type(const selector *s, int64_t cell, const bool is_packed)
 {
     (void)is_packed;
     return match_range(s, fetch_any_cell_range(s->g, s->query->field, cell));
 }
 
-static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
+static int64_t mark_cells_of_any_type(const selector *s, int64_t begin, int64_t end)
 {
-    return mark_matching_cells(s, begin, end, match_any, false);
+    return mark_matching_cells(s, begin, end, match_cell_of_any_type, false);
 }
 
 /* Packs `count` bytes, each 0 or 1, into bits. The bytes up to the next multiple of 8 must be readable and also be 0 or
@@ -282,7 +282,7 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
                  drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
-            drawn |= (uint64_t) !((g->ghosts && grid_is_flagged(g, cell)) || grid_is_flat(g, cell)) << n;
+            drawn |= (uint64_t) !((g->ghosts && grid_is_flagged_as_ghost(g, cell)) || grid_is_flat(g, cell)) << n;
         }
         if (!g->ghosts && !g->flat) drawn = r.count < WORD_CELLS ? (UINT64_C(1) << r.count) - 1 : ~UINT64_C(0);
         unusable += __builtin_popcountll(drawn & ~finite);
@@ -299,9 +299,9 @@ static selector make_selector(const grid *g, const mmbvh_query *query, uint64_t 
 {
     static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
     const grid_field *field = query->field;
-    selector s = {.run = mark_any, .g = g, .query = query, .values = field->values, .bits = bits};
+    selector s = {.run = mark_cells_of_any_type, .g = g, .query = query, .values = field->values, .bits = bits};
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    if (is_float && !field->source_cells && !grid_has_faces(g))
+    if (is_float && !field->source_cells && !grid_may_have_polyhedra(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
     if (rows_can_read(g, field)) s.run = mark_rows;
     if (field->component > 0) s.values.data += field->component * field->component_stride;

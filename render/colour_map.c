@@ -57,14 +57,14 @@ static colour_table tables[COLOUR_MAP_COUNT];
 
 float colour_linear_from_srgb(float srgb)
 {
-    return (float)colour_linear_of(srgb);
+    return (float)colour_linear_from_srgb_double(srgb);
 }
 
 static void fill_published(colour_table table, const uint64_t *codes)
 {
     for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
         for (int c = 0; c < 3; c++)
-            table[i][c] = (float)colour_linear_of((double)(codes[i] >> (32 - 16 * c) & 65535) / 65535);
+            table[i][c] = (float)colour_linear_from_srgb_double((double)(codes[i] >> (32 - 16 * c) & 65535) / 65535);
 }
 
 static double channel_of(unsigned colour, int channel)
@@ -80,7 +80,7 @@ static void fill_palette(colour_table table, const brewer_palette *palette)
         const int key = x < last ? (int)x : last - 1;
         for (int c = 0; c < 3; c++) {
             const double low = channel_of(palette->keys[key], c), high = channel_of(palette->keys[key + 1], c);
-            table[i][c] = (float)colour_linear_of(low + (x - key) * (high - low));
+            table[i][c] = (float)colour_linear_from_srgb_double(low + (x - key) * (high - low));
         }
     }
 }
@@ -98,7 +98,8 @@ static void fill_diverging(colour_table table, unsigned low, unsigned high)
 static void fill_grey(colour_table table)
 {
     for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
-        for (int c = 0; c < 3; c++) table[i][c] = (float)colour_linear_of((double)i / (COLOUR_TABLE_SIZE - 1));
+        for (int c = 0; c < 3; c++)
+            table[i][c] = (float)colour_linear_from_srgb_double((double)i / (COLOUR_TABLE_SIZE - 1));
 }
 
 static const brewer_palette *find_palette(const char *name)

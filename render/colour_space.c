@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
-double colour_linear_of(double srgb)
+double colour_linear_from_srgb_double(double srgb)
 {
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
@@ -38,7 +38,7 @@ static void lab_from_srgb(const double srgb[3], double lab[3])
     double f[3];
     for (int row = 0; row < 3; row++) {
         double sum = 0;
-        for (int c = 0; c < 3; c++) sum += xyz_from_rgb[row][c] * colour_linear_of(srgb[c]);
+        for (int c = 0; c < 3; c++) sum += xyz_from_rgb[row][c] * colour_linear_from_srgb_double(srgb[c]);
         f[row] = lab_curve(sum / white_xyz[row]);
     }
     lab[0] = 116 * f[1] - 16;
@@ -147,7 +147,7 @@ static void interpolate_hsv(const double a[3], const double b[3], double share, 
     for (int c = 0; c < 3; c++) {
         const double turn = fmod(from[0] + (c == 0 ? 5 : c == 1 ? 3 : 1), 6);
         const double off = fmax(0, fmin(1, fmin(turn, 4 - turn)));
-        linear[c] = (float)colour_linear_of(from[2] * (1 - from[1] * off));
+        linear[c] = (float)colour_linear_from_srgb_double(from[2] * (1 - from[1] * off));
     }
 }
 
@@ -155,7 +155,7 @@ static void interpolate_hsv(const double a[3], const double b[3], double share, 
 
 static void interpolate_srgb(const double a[3], const double b[3], double share, float linear[3])
 {
-    for (int c = 0; c < 3; c++) linear[c] = (float)colour_linear_of(mix(a[c], b[c], share));
+    for (int c = 0; c < 3; c++) linear[c] = (float)colour_linear_from_srgb_double(mix(a[c], b[c], share));
 }
 
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3])
@@ -169,7 +169,7 @@ void colour_between(colour_space space, const double a[3], const double b[3], do
     }
 }
 
-int colour_table_entries(const colour_point *points, int count)
+int colour_choose_table_size(const colour_point *points, int count)
 {
     enum { EVEN = 256, UNEVEN = 1025 };
     const double low = points[0].at, width = points[count - 1].at - low;

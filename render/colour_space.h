@@ -15,7 +15,7 @@ typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3]);
 
 /* Converts one sRGB component to linear light, in double. */
-double colour_linear_of(double srgb);
+double colour_linear_from_srgb_double(double srgb);
 
 typedef struct colour_point {
     double at;      /* position of the colour; positions of a list increase or stay equal */
@@ -25,7 +25,7 @@ typedef struct colour_point {
 /* Returns how many entries an evenly spaced table through the points (2 or more) should have. If the points are evenly
  * spaced, it is 256 or a few more, so that each point is an entry. Otherwise it is 1025; a step, given by two points at
  * one position, is then spread over the distance between two entries. */
-int colour_table_entries(const colour_point *points, int count);
+int colour_choose_table_size(const colour_point *points, int count);
 /* Fills a table of `entries` evenly spaced colours (3 floats each, linear light) that are interpolated between the
  * points. Its first entry has the colour of the first point, its last entry that of the last point. */
 void colour_fill_table(const colour_point *points, int count, colour_space space, float *table, int entries);

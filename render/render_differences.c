@@ -26,7 +26,7 @@ bool render_has_differences(const render_job *job)
     return false;
 }
 
-void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2])
+void render_compute_field_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2])
 {
     for (int i = 0; i < job->surface_count; i++) render_surface_range(job, i, ranges[i]);
 }
@@ -49,7 +49,7 @@ static const double box_margin = 1e-5;
 
 /* The six sample points are the ends of three line segments, one along each axis, that are centred at the hit and 2 *
  * reach long. The function tests whether one of these line segments meets the box. */
-bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box)
+bool render_difference_points_meet_box(const render_job *job, const render_pending_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
@@ -124,8 +124,9 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
 /* Processes `count` pending hits in parallel, CHUNK_HITS at a time. If `out` is NULL, the field is sampled around the
  * hits and stored in `samples`. Otherwise the hits are lit: samples and shadings are read, and the fragments are stored
  * in `out`. */
-static insitu_status process_chunks(const render_job *job, const render_pending_hit *hits, float (*shadings)[2][3],
-                                    render_difference_samples *samples, fragment *out, int64_t count, base_error *error)
+static insitu_status sample_or_light_pending_hits(const render_job *job, const render_pending_hit *hits,
+                                                  float (*shadings)[2][3], render_difference_samples *samples,
+                                                  fragment *out, int64_t count, base_error *error)
 {
     const kernel_table *kernels = render_kernels();
     kernel_frame frame;
@@ -149,7 +150,7 @@ static insitu_status process_chunks(const render_job *job, const render_pending_
         render_thread_end(&thread);
         region_leave();
     }
-    render_unprepare(&frame);
+    render_free_prepared_frame(&frame);
     if (!has_memory)
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for normals of %lld hits", (long long)count);
     return status;
@@ -160,7 +161,7 @@ insitu_status render_sample_pending_hits(const render_job *job, const render_pen
 {
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
     if (!count || !job->part_count) return INSITU_OK;
-    return process_chunks(job, hits, NULL, out, NULL, count, error);
+    return sample_or_light_pending_hits(job, hits, NULL, out, NULL, count, error);
 }
 
 void render_differences_merge(render_difference_samples *into, const render_difference_samples *other)
@@ -178,5 +179,5 @@ insitu_status render_light_pending_hits(const render_job *job, const render_pend
                                         base_error *error)
 {
     if (!count) return INSITU_OK;
-    return process_chunks(job, list->items + first, list->shadings + first, samples, out, count, error);
+    return sample_or_light_pending_hits(job, list->items + first, list->shadings + first, samples, out, count, error);
 }

@@ -25,14 +25,14 @@ bool render_has_differences(const render_job *job);
 
 /* Computes the range of values of each surface's field on this rank. The caller reduces the ranges of all ranks to
  * those over all ranks (render_job.waiting_ranges). */
-void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
+void render_compute_field_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
 
 /* Sorts the hits by tile (16 × 16 pixels) and by block of 4 × 4 pixels in it, so that hits of neighbouring pixels are
  * adjacent in the list. The order only affects speed. Returns false and keeps the order if memory ran out. */
 bool render_differences_sort(const render_job *job, render_pending_list *list);
 
 /* Returns whether one of the six sample points of the hit may be in the box. */
-bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box);
+bool render_difference_points_meet_box(const render_job *job, const render_pending_hit *hit, const render_box *box);
 
 /* Samples the field in this rank's cells around the hits, which may belong to any rank. out[i]: samples of hits[i].
  * Local. */

@@ -37,7 +37,8 @@ static bool reserve_folding(render_folding *folding, int64_t count)
 
 /* Sorts the tile's fragments by pixel, keeping the order within a pixel. The fragments of pixel k begin at
  * items[starts[k]]. */
-static void collect(render_folding *folding, const pixel_area *area, const fragment *items, int64_t count)
+static void sort_fragments_by_pixel(render_folding *folding, const pixel_area *area, const fragment *items,
+                                    int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
     int64_t *starts = folding->starts;
@@ -52,7 +53,7 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
 /* Sorts a pixel's volume fragments by depth; they are nearly sorted already. Kinds are not compared: the kind only
  * marks the first fragment of a run (a sequence without gaps, defined at the top of this file), and this mark must not
  * affect the order. */
-static void sort(fragment *items, int64_t count)
+static void sort_fragments_by_depth(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
         fragment moving = items[i];
@@ -78,7 +79,7 @@ static float compute_segment_end_error(float t)
 
 /* Moves the end of each folded fragment towards the eye by its error bound, so that compositing does not take fragments
  * of touching cells for overlapping ones (kernel_segments.h). Samples need no such margin. */
-static void shorten(const render_folding *folding, fragment *items, int64_t count)
+static void shorten_folded_segments(const render_folding *folding, fragment *items, int64_t count)
 {
     for (int64_t i = 0; i < count && folding->has_segments; i++)
         items[i].t_out -= compute_segment_end_error(items[i].t_out);
@@ -87,7 +88,7 @@ static void shorten(const render_folding *folding, fragment *items, int64_t coun
 /* Blends the `count` fragments of one run (a sequence without gaps), separately in each interval of the ray
  * (fragment_interval_number()). Stores the resulting fragments at `out`, and returns the address behind the last
  * one. */
-static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
+static fragment *fold_gapless_fragments(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;
     float begin = -INFINITY, end = INFINITY;
@@ -102,7 +103,7 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
         const int32_t interval_number = fragment_interval_number(run[i].t_in);
         for (n = 1; i + n < count && fragment_interval_number(run[i + n].t_in) == interval_number;) n++;
         const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
-        shorten(folding, run + i, made);
+        shorten_folded_segments(folding, run + i, made);
         for (int64_t k = i; k < i + made; k++)
             if (fragment_changes_picture(&run[k])) *out++ = run[k];
     }
@@ -122,10 +123,10 @@ static fragment *fold_pixel(const render_folding *folding, fragment *items, int6
         if (is_mark) out->kind = FRAGMENT_VOLUME;
         out++;
     }
-    sort(items, volumes);
+    sort_fragments_by_depth(items, volumes);
     for (int64_t i = 0, n; i < volumes; i += n) {
         for (n = 1; i + n < volumes && items[i + n].kind == FRAGMENT_VOLUME;) n++;
-        out = fold_run(folding, items + i, n, out);
+        out = fold_gapless_fragments(folding, items + i, n, out);
     }
     return out;
 }
@@ -135,7 +136,7 @@ bool render_fold(render_folding *folding, const pixel_area *area, fragment_list 
     const int64_t count = list->count, pixels = (int64_t)area->width * area->height;
     if (count == 0) return true;
     if (!reserve_folding(folding, count)) return false;
-    collect(folding, area, list->items, count);
+    sort_fragments_by_pixel(folding, area, list->items, count);
     fragment *out = list->items;
     for (int64_t k = 0; k < pixels; k++) {
         const int64_t own = folding->starts[k + 1] - folding->starts[k];

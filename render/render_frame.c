@@ -20,14 +20,14 @@
 #include "render_prepare.h"
 #include "render_thread.h"
 
-double render_seconds(void)
+double render_read_clock(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static pixel_area area_of(const render_camera *camera, int column, int row)
+static pixel_area area_of_tile(const render_camera *camera, int column, int row)
 {
     const int x = column * KERNEL_TILE, y = row * KERNEL_TILE;
     return (pixel_area){x, y, camera->width - x < KERNEL_TILE ? camera->width - x : KERNEL_TILE,
@@ -48,7 +48,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     for (int tile = 0; tile < columns * rows; tile++) {
         if (!render_thread_begin(frame, kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
-        const pixel_area area = area_of(camera, tile % columns, tile / columns);
+        const pixel_area area = area_of_tile(camera, tile % columns, tile / columns);
         thread->out_of_memory = thread->out_of_memory || !render_candidates_gather(frame, thread, area.x, area.y);
         kernels->trace_tile(frame, thread, area.x, area.y);
         if (folds) thread->out_of_memory = thread->out_of_memory || !render_fold(&fold, &area, own);
@@ -113,7 +113,8 @@ bool render_reserve_fragments(fragment_list *list, int64_t more)
     return true;
 }
 
-static bool end_threads(const render_job *job, kernel_thread *states, int threads, render_statistics *statistics)
+static bool free_threads_and_sum_statistics(const render_job *job, kernel_thread *states, int threads,
+                                            render_statistics *statistics)
 {
     bool has_memory = true;
     double surface = 0, volume = 0;
@@ -141,17 +142,17 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
     if (!states) return false;
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (frame->is_binned && !render_surfaces_are_small(frame)) {
-        const double start = render_seconds();
+        const double start = render_read_clock();
         render_candidates_find(frame, states, threads);
-        statistics->surface_ms = 1e3 * (render_seconds() - start);
+        statistics->surface_ms = 1e3 * (render_read_clock() - start);
     }
     if (frame->bins_volume) {
-        const double start = render_seconds();
+        const double start = render_read_clock();
         render_candidates_find_volume(frame, states, threads);
-        statistics->volume_ms = 1e3 * (render_seconds() - start);
+        statistics->volume_ms = 1e3 * (render_read_clock() - start);
     }
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
-    if (frame->needs_planes) render_trees_cover(frame);
+    if (frame->needs_planes) render_compute_tree_cover(frame);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
@@ -159,7 +160,7 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
         region_leave();
     }
     render_candidates_free(frame);
-    const bool has_memory = end_threads(job, states, threads, statistics);
+    const bool has_memory = free_threads_and_sum_statistics(job, states, threads, statistics);
     base_free(states);
     return has_memory;
 }
@@ -230,7 +231,7 @@ static insitu_status draw(const render_job *job, fragment_list *out, fragment_ca
               : trace_frame(&frame, take, state, threads, statistics)))
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
                            job->camera.width, job->camera.height);
-    render_unprepare(&frame);
+    render_free_prepared_frame(&frame);
     return status;
 }
 

@@ -49,7 +49,7 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
     kernel_sort_candidates_by_part(items, m->prefetched_count);
     for (int n = 0; n < m->prefetched_count; n++) {
         int part;
-        const int value = kernel_tile_set_source(t, items[n]->source, &part);
+        const int value = kernel_tile_set_layer_of_source(t, items[n]->source, &part);
         if (kernel_candidate_blocks(t, items[n])) kernel_tile_queue_add(t, m, items[n], part, value);
     }
     m->prefetched_count = 0;
@@ -77,7 +77,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
     kernel_tile_queue_finish(t, queue);
 }
 
-SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
+SIMD_INLINE void kernel_tile_trace_binned_surfaces(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
     kernel_bin *bin = &t->thread->bin;
@@ -122,31 +122,31 @@ static unsigned active_blocks(const render_job *job, int x0, int y0)
 
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
-    const double start = render_seconds();
+    const double start = render_read_clock();
     if (t->frame->candidates)
-        kernel_tile_surface_candidates(t);
+        kernel_tile_trace_binned_surfaces(t);
     else
-        kernel_tile_surfaces(t);
+        kernel_tile_trace_all_layers(t);
     for (unsigned begun = t->begun; begun; begun &= begun - 1)
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
-            kernel_emit_opaque(&t->packets[i], &t->hits[i]);
+            kernel_emit_opaque_hits(&t->packets[i], &t->hits[i]);
         }
-    t->thread->surface_seconds += render_seconds() - start;
+    t->thread->surface_seconds += render_read_clock() - start;
 }
 
 static void trace_tile_volumes(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    const double start = render_seconds();
+    const double start = render_read_clock();
     const int intervals = f->volume_intervals ? f->volume_intervals : 1;
     for (t->clip_interval = 0; t->clip_interval < intervals; t->clip_interval++) {
         if (f->has_segments)
-            kernel_tile_segments_trace(t);
+            kernel_tile_integrate_volumes(t);
         else
-            kernel_tile_volumes(t);
+            kernel_tile_sample_volumes(t);
     }
-    t->thread->volume_seconds += render_seconds() - start;
+    t->thread->volume_seconds += render_read_clock() - start;
 }
 
 /* Returns whether the tile overlaps the rectangle of pixels in which a tree's bounding box may be visible

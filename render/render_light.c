@@ -22,43 +22,43 @@
 
 /* ---- the rays of a hit ---------------------------------------------------------------------------------------- */
 
-static hit_frame place_of(const render_job *job, const render_hit *hit)
+static hit_frame compute_hit_frame(const render_job *job, const render_hit *hit)
 {
     return hit_frame_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
 /* Returns the surface layer to which a hit's fragment belongs. The fragment's kind contains the index of an isovalue,
  * and each isovalue belongs to one layer. */
-static const render_surface_layer *layer_of(const render_job *job, const fragment *f)
+static const render_surface_layer *find_layer_of_fragment(const render_job *job, const fragment *f)
 {
     int value = (int)(f->kind - FRAGMENT_SURFACE), i = 0;
     while (i + 1 < job->surface_count && value >= job->surfaces[i].value_count) value -= job->surfaces[i++].value_count;
     return &job->surfaces[i];
 }
 
-static uint64_t all_samples(int count)
+static uint64_t make_sample_mask(int count)
 {
     return count < 64 ? ((uint64_t)1 << count) - 1 : ~(uint64_t)0;
 }
 
-bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays)
+bool render_make_hit_from_fragment(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays)
 {
     double n[3];
-    if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&layer_of(job, f)->material)) return false;
+    if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&find_layer_of_fragment(job, f)->material)) return false;
     /* unlit fragments store the normal here; it is not finite if the field's gradient is NaN or infinite */
     if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false;
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
-    *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
+    *rays = (render_hit_rays){make_sample_mask(job->occlusion->samples), 0, 0};
     hit_normal(hit->normal, n);
     for (int i = 0; i < job->light_count; i++)
         if (job->occlusion->lights >> i & 1 && hit_dot(n, job->lights[i].direction) > 0) rays->lights |= 1u << i;
     return rays->samples || rays->lights;
 }
 
-void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
-                        double directions[RENDER_MAX_SAMPLES][3])
+void render_compute_hemisphere_rays(const render_job *job, const render_hit *hit, double start[3],
+                                    double directions[RENDER_MAX_SAMPLES][3])
 {
-    const hit_frame p = place_of(job, hit);
+    const hit_frame p = compute_hit_frame(job, hit);
     memcpy(start, p.start, sizeof p.start);
     hit_directions(job, hit->pixel, (const double(*)[3])p.axes, directions);
 }
@@ -123,7 +123,7 @@ static void add_ray(tracer *t, int hit, int number, const double start[3], const
 static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_rays *rays)
 {
     const render_occlusion *o = t->job->occlusion;
-    const hit_frame p = place_of(t->job, hit);
+    const hit_frame p = compute_hit_frame(t->job, hit);
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(t->job, hit->pixel, (const double(*)[3])p.axes, samples);
     for (uint64_t left = rays->samples; left; left &= left - 1) {
@@ -156,7 +156,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
     const render_space *space = &t->job->space;
-    const hit_frame p = place_of(t->job, hit);
+    const hit_frame p = compute_hit_frame(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
@@ -183,7 +183,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const render_space *space = &t->job->space;
-    const hit_frame p = place_of(t->job, hit);
+    const hit_frame p = compute_hit_frame(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double from[3], axes[3][3];
     hit_axes_around(t->job->lights[light].direction, axes);
@@ -207,7 +207,7 @@ static void set_light_ray(tracer *t, const render_hit *hit, int light)
     b->count = 1;
 }
 
-static int by_ray(const void *a, const void *b)
+static int compare_pairs_by_ray(const void *a, const void *b)
 {
     const kernel_undecided_pair *x = a, *y = b;
     if (x->ray != y->ray) return x->ray < y->ray ? -1 : 1;
@@ -255,7 +255,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
 }
 
-static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided_pair *doubt)
+static void trace_undecided_light_ray(tracer *t, const render_hit *hit, const kernel_undecided_pair *doubt)
 {
     kernel_secondary_ray *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
@@ -268,7 +268,7 @@ static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided
 static void trace_undecided(tracer *t, const render_hit *hits)
 {
     kernel_secondary_rays *s = &t->secondary_rays;
-    qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
+    qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, compare_pairs_by_ray);
     for (int64_t first = 0, end; first < s->undecided_count; first = end) {
         kernel_undecided_pair *from = &s->undecided[first];
         const kernel_secondary_ray *ray = &t->rays[from->ray];
@@ -279,7 +279,7 @@ static void trace_undecided(tracer *t, const render_hit *hits)
         if (ray->number < RENDER_MAX_SAMPLES)
             trace_hemisphere(t, &hits[ray->hit], from, end - first);
         else
-            trace_light(t, &hits[ray->hit], from);
+            trace_undecided_light_ray(t, &hits[ray->hit], from);
     }
 }
 
@@ -350,7 +350,7 @@ static bool trace_all(const render_occluders *of, const render_hit *hits, render
     return is_well;
 }
 
-static insitu_status prepare(render_occluders *of, const render_job *job, base_error *error)
+static insitu_status prepare_and_build_occluders(render_occluders *of, const render_job *job, base_error *error)
 {
     const insitu_status status = render_prepare_surfaces(job, &of->job, &of->frame, error);
     if (status) return status;
@@ -365,7 +365,7 @@ insitu_status render_occluders_create(const render_job *job, render_occluders **
     if (!job->part_count) return INSITU_OK;
     render_occluders *of = base_calloc(1, sizeof *of);
     if (!of) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
-    const insitu_status status = prepare(of, job, error);
+    const insitu_status status = prepare_and_build_occluders(of, job, error);
     if (status)
         render_occluders_free(of);
     else
@@ -376,13 +376,13 @@ insitu_status render_occluders_create(const render_job *job, render_occluders **
 void render_occluders_free(render_occluders *of)
 {
     if (!of) return;
-    if (of->kernels) render_unprepare(&of->frame);
+    if (of->kernels) render_free_prepared_frame(&of->frame);
     occluders_free(&of->trees);
     base_free(of);
 }
 
-insitu_status render_occlude(const render_occluders *of, const render_hit *hits, render_hit_rays *rays, int64_t count,
-                             base_error *error)
+insitu_status render_clear_blocked_rays(const render_occluders *of, const render_hit *hits, render_hit_rays *rays,
+                                        int64_t count, base_error *error)
 {
     if (!count || !of || !(of->trees.triangles.node_count || of->trees.slabs.node_count)) return INSITU_OK;
     if (trace_all(of, hits, rays, count)) return INSITU_OK;
@@ -434,11 +434,11 @@ static bool is_near_box(const double from[3], double reach, const render_box *bo
     return is_near;
 }
 
-void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
-                          const render_box *boxes, int count, render_box_callback *take, void *state)
+void render_find_boxes_met_by_rays(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
+                                   const render_box *boxes, int count, render_box_callback *take, void *state)
 {
     const render_occlusion *o = job->occlusion;
-    const hit_frame p = place_of(job, hit);
+    const hit_frame p = compute_hit_frame(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(job, hit->pixel, (const double(*)[3])p.axes, samples);
@@ -462,8 +462,8 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* Computes the factors of the diffuse and specular light of a hit as kernel_shade() does, but in double and only from
  * the lights whose bits are set in `lights`. */
-static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
-                  double diffuse[3], double specular[3])
+static void compute_hit_lighting(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
+                                 double diffuse[3], double specular[3])
 {
     const double *n = p->axes[2];
     for (int a = 0; a < 3; a++) diffuse[a] = (double)m->ambient, specular[a] = 0;
@@ -488,15 +488,15 @@ void render_light_fragment(const render_job *job, const render_hit_rays *open, f
     double diffuse[3], specular[3];
     render_hit hit;
     if (f->kind < FRAGMENT_SURFACE) return;
-    layer = layer_of(job, f);
+    layer = find_layer_of_fragment(job, f);
     if (!render_takes_light(&layer->material)) return;
     hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     f->t_out = f->t_in;
     f->transmittance = layer->opacity >= 1 ? 0 : 1 - layer->opacity;
     const render_occlusion *o = job->occlusion;
-    const hit_frame p = place_of(job, &hit);
+    const hit_frame p = compute_hit_frame(job, &hit);
     const double sky = o->samples ? (double)__builtin_popcountll(open->samples) / o->samples : 1;
-    shade(job, &layer->material, &p, open->lights | ~o->lights, diffuse, specular);
+    compute_hit_lighting(job, &layer->material, &p, open->lights | ~o->lights, diffuse, specular);
     const double opacity = layer->opacity >= 1 ? 1 : (double)layer->opacity;
     for (int a = 0; a < 3; a++) f->colour[a] = (float)((double)f->colour[a] * diffuse[a] * sky + specular[a] * opacity);
 }

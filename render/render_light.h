@@ -42,12 +42,12 @@ typedef struct render_hit_rays {
 
 /* Computes the hit of an unlit fragment of the job, and sets the bits in *rays of all rays that the hit has. Returns
  * false if the fragment needs no rays to be lit. */
-bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
+bool render_make_hit_from_fragment(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
 /* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its rays into the
  * hemisphere. */
-void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
-                        double directions[RENDER_MAX_SAMPLES][3]);
+void render_compute_hemisphere_rays(const render_job *job, const render_hit *hit, double start[3],
+                                    double directions[RENDER_MAX_SAMPLES][3]);
 
 /* This rank's occluders: the cells that contain an opaque surface, which may block rays of the job's hits. */
 typedef struct render_occluders render_occluders;
@@ -59,17 +59,17 @@ void render_occluders_free(render_occluders *occluders);
 
 /* Clears the bits of the rays that this rank's opaque surfaces block. hits[i] has the rays rays[i]. occluders may be
  * NULL. Local; after an error the contents of `rays` are undefined. */
-insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
-                             int64_t count, base_error *error);
+insitu_status render_clear_blocked_rays(const render_occluders *occluders, const render_hit *hits,
+                                        render_hit_rays *rays, int64_t count, base_error *error);
 
 /* Returns the bounding box of all cells of this rank that may block rays. */
 render_box render_occluder_box(const render_job *job);
 
-/* render_rays_to_boxes() calls take(state, i, rays) for each of the `count` boxes that open rays of the hit may meet.
- * i: index of the box; rays: those rays that may meet it. */
+/* render_find_boxes_met_by_rays() calls take(state, i, rays) for each of the `count` boxes that open rays of the hit
+ * may meet. i: index of the box; rays: those rays that may meet it. */
 typedef void render_box_callback(void *state, int box, const render_hit_rays *rays);
-void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
-                          const render_box *boxes, int count, render_box_callback *take, void *state);
+void render_find_boxes_met_by_rays(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
+                                   const render_box *boxes, int count, render_box_callback *take, void *state);
 
 /* Lights an unlit fragment, whose rays in *open no surface blocks. If all rays are open, the result is the fragment
  * that RENDER_LIGHT would have given. Fragments of volumes are left unchanged. */

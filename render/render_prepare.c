@@ -14,13 +14,13 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-static float below(double v)
+static float find_nearest_float_below(double v)
 {
     const float f = (float)v;
     return (double)f > v ? nextafterf(f, -INFINITY) : f;
 }
 
-static float above(double v)
+static float find_nearest_float_above(double v)
 {
     const float f = (float)v;
     return (double)f < v ? nextafterf(f, INFINITY) : f;
@@ -30,17 +30,17 @@ static float above(double v)
  * the two touch. Returns the new number of intervals. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
-    if (count && intervals[count - 1].high >= below(low)) {
-        intervals[count - 1].high = above(high);
+    if (count && intervals[count - 1].high >= find_nearest_float_below(low)) {
+        intervals[count - 1].high = find_nearest_float_above(high);
         return count;
     }
-    intervals[count] = (mmbvh_interval){below(low), above(high)};
+    intervals[count] = (mmbvh_interval){find_nearest_float_below(low), find_nearest_float_above(high)};
     return count + 1;
 }
 
 mmbvh_interval render_isovalue_interval(double value)
 {
-    return (mmbvh_interval){below(value), above(value)};
+    return (mmbvh_interval){find_nearest_float_below(value), find_nearest_float_above(value)};
 }
 
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS])
@@ -60,9 +60,9 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double slope = high > low ? 1 / (high - low) : 1;
-    /* On a logarithmic scale, values below low / 2 are replaced by low / 2 before logarithms are taken. The position of
-     * low / 2 in the colour table is below that of `low` by more than RENDER_END, so that the replaced values still
-     * count as below the range. */
+    /* On a logarithmic scale, values find_nearest_float_below low / 2 are replaced by low / 2 before logarithms are
+     * taken. The position of low / 2 in the colour table is find_nearest_float_below that of `low` by more than
+     * RENDER_END, so that the replaced values still count as find_nearest_float_below the range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
     out->scale = t->scale;
@@ -74,7 +74,7 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
 
 /* Returns the position in the colour table of a value, as kernel_find_colour_table_position() computes it in float32.
  */
-static double ramp_position(const kernel_transfer *out, const render_transfer *t, double value)
+static double compute_colour_table_position(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -94,8 +94,8 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
     out->ramp_count = t->opacity_count - 1;
     out->base_opacity = t->opacities[0];
     for (int i = 0; i < out->ramp_count; i++) {
-        const double start = ramp_position(out, t, t->opacity_values[i]);
-        const double along = ramp_position(out, t, t->opacity_values[i + 1]) - start;
+        const double start = compute_colour_table_position(out, t, t->opacity_values[i]);
+        const double along = compute_colour_table_position(out, t, t->opacity_values[i + 1]) - start;
         out->ramp_start[i] = (float)start;
         out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
@@ -351,7 +351,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     return status;
 }
 
-void render_unprepare(kernel_frame *frame)
+void render_free_prepared_frame(kernel_frame *frame)
 {
     base_free(frame->surfaces);
     for (int i = 0; i < RENDER_MAX_VOLUMES; i++) render_pieces_free(&frame->pieces[i]);
@@ -373,7 +373,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     memset(frame, 0, sizeof *frame);
     frame->job = job;
     for (int i = 0; i < job->part_count; i++)
-        frame->has_polyhedra = frame->has_polyhedra || grid_has_faces(job->parts[i].cells);
+        frame->has_polyhedra = frame->has_polyhedra || grid_may_have_polyhedra(job->parts[i].cells);
     frame->surfaces = base_calloc((size_t)job->surface_count, sizeof *frame->surfaces);
     if (!frame->surfaces) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d layers", job->surface_count);
     prepare_camera(frame);
@@ -384,7 +384,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
         prepare_transfer(&frame->volumes[i], job->volumes[i].transfer, job->step);
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
     const insitu_status segments = prepare_segments(frame, error);
-    if (segments != INSITU_OK) render_unprepare(frame);
+    if (segments != INSITU_OK) render_free_prepared_frame(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* a tile's list of candidates is consumed when it is traced, so the volume is binned only if its clips leave one

@@ -102,7 +102,7 @@ static unsigned chord_find_rays_in_box(const kernel_packet *p, const double px[S
     mmbvh_node_box(tree, node, lower, upper);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         double base[3], direction[3];
-        kernel_tree_ray(p->frame, px[i], py[i], base, direction);
+        kernel_compute_scaled_world_ray(p->frame, px[i], py[i], base, direction);
         met |= (unsigned)chord_meets_box(base, direction, lower, upper) << i;
     }
     return met & vm_bits(p->active);

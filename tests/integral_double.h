@@ -10,8 +10,8 @@
 void integrate_in_double(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 void integrate_in_float(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
-/* For each range of values, computes the four bounds of kernel_light_bounds(): variation, cost, extinction, steepness.
- * They bound how much an error of the field can change the light. */
+/* For each range of values, computes the four bounds of kernel_look_up_light_error_bounds(): variation, cost,
+ * extinction, steepness. They bound how much an error of the field can change the light. */
 void integral_compute_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
 
 #endif

@@ -164,7 +164,7 @@ void integrate_in_double(const render_transfer *t, double length, double v_in, d
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
     kernel_light light = kernel_light_none();
     const kernel_unit_segment run = kernel_unit_segment_of(vf_set(length), vf_set(v_in), vf_set(v_out));
-    kernel_integrate(&pieces, (vm){-1, -1}, &run, &light);
+    kernel_integrate_segments(&pieces, (vm){-1, -1}, &run, &light);
     for (int c = 0; c < 3; c++) out[c] = light.colour[c][0];
     out[3] = light.transmittance[0];
     render_pieces_free(&pieces);

@@ -14,7 +14,7 @@ void integrate_in_float(const render_transfer *t, double length, double v_in, do
     kernel_light light = kernel_light_none();
     const kernel_unit_segment run =
         kernel_unit_segment_of(vf_set((float)length), vf_set((float)v_in), vf_set((float)v_out));
-    kernel_integrate(&pieces, vm_all_lanes(), &run, &light);
+    kernel_integrate_segments(&pieces, vm_all_lanes(), &run, &light);
     for (int c = 0; c < 3; c++) out[c] = (double)light.colour[c][0];
     out[3] = (double)light.transmittance[0];
     render_pieces_free(&pieces);
@@ -29,7 +29,7 @@ void integral_compute_variations(const render_transfer *t, int count, const doub
     for (int i = 0; i < count; i++) {
         const vf low = vf_set((float)ranges[i][0]), high = vf_set((float)ranges[i][1]);
         vf found[KERNEL_LIGHT_ENTRIES];
-        kernel_light_bounds(&pieces, low, high, found);
+        kernel_look_up_light_error_bounds(&pieces, low, high, found);
         for (int n = 0; n < KERNEL_LIGHT_ENTRIES; n++) out[i][n] = (double)found[n][0];
     }
     render_pieces_free(&pieces);

@@ -74,7 +74,7 @@ static void add_cell(reference_integral *scene, int volume, int part, int64_t in
     if (!grid_cell_values(&field->fields[part], index, vertices, c->cell.count, c->values)) return;
     for (int i = 0; i < c->cell.count; i++) {
         double from_eye[3];
-        grid_vertex(g, vertices[i], c->cell.world[i]);
+        grid_read_vertex_position(g, vertices[i], c->cell.world[i]);
         for (int axis = 0; axis < 3; axis++) from_eye[axis] = c->cell.world[i][axis] - job->camera.eye[axis];
         for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = reference_dot(axes[axis], from_eye);
         reference_box_add(&c->box, c->cell.position[i]);

@@ -133,7 +133,7 @@ void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cel
     grid_cell_faces(g, index, &first, &end);
     for (int64_t i = first; i < end; i++) {
         int64_t from, to;
-        grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &to);
+        grid_face_vertices(g, grid_read_index(&g->connectivity, i), &from, &to);
         if (p->face_count == REFERENCE_MAX_FACES || to - from > REFERENCE_MAX_SIDES) {
             fprintf(stderr, "reference: a polyhedron of too many faces or sides\n");
             exit(1);
@@ -141,7 +141,7 @@ void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cel
         int *loop = p->faces[p->face_count];
         p->face_size[p->face_count++] = (int)(to - from);
         for (int64_t k = from; k < to; k++)
-            *loop++ = find_or_add_vertex(cell, vertices, grid_array_index(&g->face_connectivity, k));
+            *loop++ = find_or_add_vertex(cell, vertices, grid_read_index(&g->face_connectivity, k));
     }
 }
 

@@ -83,7 +83,7 @@ reference_scene *reference_create(const render_job *job)
         double *p = scene->positions[i] = reference_reallocate(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
         for (int64_t v = 0; v < g->vertex_count; v++) {
             double world[3];
-            grid_vertex(g, v, world);
+            grid_read_vertex_position(g, v, world);
             for (int axis = 0; axis < 3; axis++) world[axis] -= job->camera.eye[axis];
             for (int axis = 0; axis < 3; axis++) p[3 * v + axis] = reference_dot(axes[axis], world);
         }
@@ -458,7 +458,7 @@ static void load_cell(const reference_scene *scene, int part, int64_t index, cam
     else
         c->cell.count = grid_cell_vertices(c->part->cells, index, c->vertices);
     for (int i = 0; i < c->cell.count; i++) {
-        grid_vertex(c->part->cells, c->vertices[i], c->cell.world[i]);
+        grid_read_vertex_position(c->part->cells, c->vertices[i], c->cell.world[i]);
         memcpy(c->cell.position[i], scene->positions[part] + 3 * c->vertices[i], sizeof c->cell.position[i]);
     }
     for (int axis = 0; axis < 3; axis++) {

@@ -42,7 +42,7 @@ static inline void bundle_initialize(bundle *b)
 /* Transforms a cell whose type, count, world and values are set. Tile space equals world space here. */
 static inline void bundle_transform_cell(bundle *b)
 {
-    kernel_cell_order(&b->cell);
+    kernel_cell_sort_vertices(&b->cell);
     for (int i = 0; i < b->cell.count; i++) {
         b->cell.x[i] = (float)b->cell.world[i][0];
         b->cell.y[i] = (float)b->cell.world[i][1];

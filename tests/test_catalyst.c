@@ -52,7 +52,7 @@ static conduit_node *make_initialize_node(void)
 static conduit_node *fetch_results(void)
 {
     conduit_node *node = conduit_node_create();
-    catalyst_adaptor_results(&writer, node);
+    catalyst_adaptor_write_results(&writer, node);
     return node;
 }
 
@@ -203,7 +203,7 @@ static void parameters_are_returned_as_results(void **state)
                read_number(out, "insitu/parameters/outflow") == 3);
     conduit_node_destroy(out);
     out = conduit_node_create();
-    catalyst_adaptor_about(&writer, out);
+    catalyst_adaptor_write_about(&writer, out);
     everywhere(has_word(out, "catalyst/implementation", "insitu"));
     conduit_node_destroy(out);
     conduit_node_destroy(node);

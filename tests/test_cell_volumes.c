@@ -102,7 +102,7 @@ static void volumes_of_bent_cells_match_quadrature(void **state)
         if (trial & 4) test_mesh_mirror_cells(&mesh, false);
         const int type = mesh.types[0];
         double places[8][3];
-        for (int i = 0; i < grid_type_vertices(type); i++)
+        for (int i = 0; i < grid_type_vertex_count(type); i++)
             memcpy(places[i], mesh.coordinates + 3 * mesh.connectivity[i], sizeof places[i]);
         const double expected = type == GRID_TET ? NAN : integrate_volume(type, places);
         if (type != GRID_TET) assert_nearly_equal(compute_mesh_volume(&mesh), expected);

@@ -263,7 +263,7 @@ static void trace_rays(const render_job *job, kernel_thread *thread, chord_rays 
     polyhedra_reset(thread->polyhedra);
     get_kernel_table()->trace(&frame, thread, rays);
     assert_false(thread->out_of_memory);
-    render_unprepare(&frame);
+    render_free_prepared_frame(&frame);
 }
 
 /* Traces rays through a mesh. tallies[0] counts rays that are traced as single rays, tallies[1] the same rays traced as

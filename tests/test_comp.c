@@ -268,7 +268,7 @@ static void permutations_give_the_same_bits(void **context)
  * number of blocks is bounded, and that every strip belongs to a block. */
 static void check_grid(uint32_t width, uint32_t height, int ranks)
 {
-    const comp_grid grid = comp_grid_of(width, height, ranks);
+    const comp_grid grid = comp_make_grid(width, height, ranks);
     const uint32_t every = grid.strips / 5000000 + 1; /* only a sample is checked if there are many strips */
     uint64_t area = 0;
     assert_true(grid.blocks >= 1 && grid.blocks <= comp_max_blocks(ranks));
@@ -278,22 +278,22 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
                 (grid.row_shift == 0 && grid.blocks == grid.strips));
     for (uint64_t s64 = 0; s64 < grid.strips; s64 += every) {
         const uint32_t s = (uint32_t)s64;
-        const comp_area strip = comp_grid_area(&grid, s);
+        const comp_area strip = comp_find_strip_area(&grid, s);
         assert_true(strip.width >= 1 && strip.height >= 1);
         assert_true(strip.x + strip.width <= width && strip.y + strip.height <= height);
-        assert_true(comp_grid_block(&grid, s) < grid.blocks);
+        assert_true(comp_find_block_of_strip(&grid, s) < grid.blocks);
         area += (uint64_t)strip.width * strip.height;
     }
     assert_true(every > 1 || area == (uint64_t)width * height);
     for (int trial = 0; trial < 2000; trial++) {
         const uint32_t last = (uint32_t)((uint64_t)width * height - 1);
         const uint32_t pixel = trial == 0 ? last : draw_random() % (last + (last < UINT32_MAX));
-        const uint32_t strip = comp_grid_strip(&grid, pixel), at = comp_grid_index_in_strip(&grid, pixel);
-        const comp_area its = comp_grid_area(&grid, strip);
-        assert_int_equal(comp_grid_y(&grid, pixel), pixel / width);
+        const uint32_t strip = comp_find_strip_of_pixel(&grid, pixel), at = comp_grid_index_in_strip(&grid, pixel);
+        const comp_area its = comp_find_strip_area(&grid, strip);
+        assert_int_equal(comp_find_row_of_pixel(&grid, pixel), pixel / width);
         assert_true(strip < grid.strips && at < COMP_STRIP_PIXELS);
         assert_true(at % COMP_LANES < its.width && at / COMP_LANES < its.height);
-        assert_int_equal(comp_grid_pixel(&grid, strip, at), pixel);
+        assert_int_equal(comp_find_pixel_of_strip(&grid, strip, at), pixel);
     }
 }
 
@@ -382,7 +382,8 @@ static void claim_span(const comp_grid *grid, uint32_t y, double from, double to
     const uint32_t end = (uint32_t)fmin(fmax(ceil(to), 0), grid->width);
     for (uint32_t x = begin, next; x < end; x = next) {
         next = x / COMP_LANES * COMP_LANES + COMP_LANES < end ? x / COMP_LANES * COMP_LANES + COMP_LANES : end;
-        claims[comp_grid_block(grid, comp_grid_strip(grid, y * grid->width + x))].fragments += next - x;
+        claims[comp_find_block_of_strip(grid, comp_find_strip_of_pixel(grid, y * grid->width + x))].fragments +=
+            next - x;
     }
 }
 
@@ -456,7 +457,7 @@ static void equal_fragments_of_all_ranks_are_balanced_over_owners(void **context
         for (int square = 0; square < 2; square++)
             for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) {
                 const uint32_t width = widths[w], height = square ? width : width * 9 / 16;
-                const comp_grid grid = comp_grid_of(width, height, ranks[n]);
+                const comp_grid grid = comp_make_grid(width, height, ranks[n]);
                 for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
                     const int64_t covered = set_claims_of_shape(&grid, shapes[k]);
                     for (uint32_t b = 0; b < grid.blocks; b++)
@@ -485,7 +486,7 @@ static void different_fragments_of_ranks_are_balanced_over_owners(void **context
     (void)context;
     static const int ranks[] = {2, 3, 16, 64, 100, 509};
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) {
-        const comp_grid grid = comp_grid_of(1280, 720, ranks[n]);
+        const comp_grid grid = comp_make_grid(1280, 720, ranks[n]);
         set_claims_of_shape(&grid, compute_disc_interval);
         for (uint32_t b = 0; b < grid.blocks; b++) {
             int64_t have[MOST_RANKS];
@@ -505,11 +506,11 @@ static void different_fragments_of_ranks_are_balanced_over_owners(void **context
  * the mean number of fragments to a tenth. */
 static void check_balance_on_route(const comp_route *route)
 {
-    const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
+    const comp_grid grid = comp_make_grid(1920, 1080, route->ranks);
     set_claims_of_shape(&grid, compute_disc_interval);
     for (uint32_t b = 0; b < grid.blocks; b++)
         claims[b].priority = comp_claim_priority(b, (int)(draw_random() % (uint32_t)route->ranks), claims[b].fragments);
-    comp_route_assign_positions(route, claims, grid.blocks);
+    comp_convert_claims_to_places(route, claims, grid.blocks);
     for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_priority_rank(claims[b].priority) < route->owners);
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
@@ -533,7 +534,7 @@ static void fragments_are_balanced_with_fewer_owners_than_ranks(void **context)
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++)
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++)
             for (int is_cyclic = 0; is_cyclic < 2; is_cyclic++) {
-                const comp_route route = comp_route_of(s, ranks[n][0], (comp_nodes){ranks[n][1], is_cyclic}, 8);
+                const comp_route route = comp_make_route(s, ranks[n][0], (comp_nodes){ranks[n][1], is_cyclic}, 8);
                 folded += route.owners < route.ranks;
                 check_balance_on_route(&route);
             }
@@ -617,10 +618,10 @@ typedef struct received_sheets {
 static bool store_sheet(void *state_of, const comp_sheet *sheet, int count)
 {
     received_sheets *h = state_of;
-    assert_int_equal(comp_sheet_count(sheet), count);
+    assert_int_equal(comp_sheet_count_pixels(sheet), count);
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
         if (comp_sheet_has(sheet, k))
-            h->items[h->count++] = comp_sheet_get(sheet, k, comp_grid_pixel(h->grid, sheet->strip, k));
+            h->items[h->count++] = comp_sheet_get(sheet, k, comp_find_pixel_of_strip(h->grid, sheet->strip, k));
     h->sheets++;
     return true;
 }
@@ -642,7 +643,7 @@ static void sheets_contain_all_fragments(void **context)
     state = 11;
     for (int threads = 1; threads <= 4; threads += 3)
         for (int spread = 1; spread <= 1000; spread *= 10) {
-            comp_grid grid = comp_grid_of(101, 67, threads); /* the grid for four ranks has shorter strips */
+            comp_grid grid = comp_make_grid(101, 67, threads); /* the grid for four ranks has shorter strips */
             comp_strips strips;
             received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
@@ -655,7 +656,7 @@ static void sheets_contain_all_fragments(void **context)
             for (uint32_t s = 0; s < grid.strips; s++) {
                 const int64_t before = h.count;
                 assert_true(comp_strips_pass_sheets(&strips, s, layers, store_sheet, &h));
-                assert_int_equal(h.count - before, comp_strips_count(&strips, s));
+                assert_int_equal(h.count - before, comp_strips_count_fragments(&strips, s));
             }
             assert_int_equal(h.count, COUNT);
             qsort(items, COUNT, sizeof *items, compare_all_bits);
@@ -670,7 +671,7 @@ static void sheets_contain_all_fragments(void **context)
 static void pixels_outside_the_image_are_detected(void **context)
 {
     (void)context;
-    const comp_grid grid = comp_grid_of(10, 10, 1);
+    const comp_grid grid = comp_make_grid(10, 10, 1);
     fragment items[3] = {{.pixel = 99}, {.pixel = 0}, {.pixel = 100}};
     comp_strips strips;
     for (int count = 0; count <= 3; count++) {

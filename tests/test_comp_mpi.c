@@ -342,10 +342,10 @@ static void messages_match_the_predicted_count(void **context)
         setting s = make_setting(16, 16, 0, distribute_random, 1);
         assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
                           "all is well");
-        const comp_route route = comp_route_of(group.schedule, rank_count, group.nodes, 8);
-        const int place = comp_route_position(&route, own_rank);
+        const comp_route route = comp_make_route(group.schedule, rank_count, group.nodes, 8);
+        const int place = comp_find_place_of_rank(&route, own_rank);
         const int64_t up = place > 0 && place < route.owners;
-        assert_everywhere(statistics.sent_messages == comp_route_messages(&route, place) * (rank_count > 1) + up,
+        assert_everywhere(statistics.sent_messages == comp_count_route_messages(&route, place) * (rank_count > 1) + up,
                           "messages are as counted");
         free_setting(&s);
     }

@@ -114,7 +114,7 @@ static void encoded_sheets_decode_unchanged(void **context)
     for (int trial = 0; trial < 3000; trial++) {
         const int words = trial % 2 ? COMP_WORDS : COMP_PIXEL_WORDS;
         fill_sheet(p.sheet);
-        const int count = comp_sheet_count(p.sheet);
+        const int count = comp_sheet_count_pixels(p.sheet);
         const size_t length = (size_t)(comp_sheet_write_by(CPU_PLAIN, p.sheet, words, plain) - plain);
         for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
             comp_sheet_head head;
@@ -207,10 +207,10 @@ enum { WIDE = 40, HIGH = 50 };
 static void store_picture_with_loops(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4],
                                      int ranks, float *stored)
 {
-    const comp_grid grid = comp_grid_of(WIDE, HIGH, ranks);
+    const comp_grid grid = comp_make_grid(WIDE, HIGH, ranks);
     memset(stored, 0x55, 5 * WIDE * HIGH * sizeof *stored);
     for (uint32_t strip = 0; strip < grid.strips; strip++) {
-        const comp_area area = comp_grid_area(&grid, strip);
+        const comp_area area = comp_find_strip_area(&grid, strip);
         float *const depths = strip % 2 ? stored + 4 * WIDE * HIGH : NULL;
         image out = {.width = WIDE, .height = HIGH, .rgba = stored, .depth = depths};
         loops->store(pixels, &area, background, &out);
@@ -274,18 +274,19 @@ static void check_route_to_owner(const comp_route *route, int from, int owner)
 
 static void check_route(comp_schedule schedule, int ranks, comp_nodes nodes, int radix)
 {
-    const comp_route route = comp_route_of(schedule, ranks, nodes, radix);
+    const comp_route route = comp_make_route(schedule, ranks, nodes, radix);
     int64_t product = 1;
     for (int i = 0; i < route.round_count; i++) product *= route.radix[i];
     assert_int_equal(product, route.owners);
     assert_true(route.owners <= ranks && 2 * route.owners > ranks - (ranks == 1));
     const int step = ranks / 97 + 1;
     for (int r = 0; r < ranks; r += step) {
-        assert_int_equal(comp_route_rank(&route, comp_route_position(&route, r)), r);
-        for (int o = 0; o < route.owners; o += step) check_route_to_owner(&route, comp_route_position(&route, r), o);
-        check_route_to_owner(&route, comp_route_position(&route, r), route.owners - 1);
+        assert_int_equal(comp_find_rank_at_place(&route, comp_find_place_of_rank(&route, r)), r);
+        for (int o = 0; o < route.owners; o += step)
+            check_route_to_owner(&route, comp_find_place_of_rank(&route, r), o);
+        check_route_to_owner(&route, comp_find_place_of_rank(&route, r), route.owners - 1);
     }
-    assert_int_equal(comp_route_position(&route, 0), 0);
+    assert_int_equal(comp_find_place_of_rank(&route, 0), 0);
 }
 
 static void routes_deliver_to_owners(void **context)
@@ -303,7 +304,7 @@ static void routes_deliver_to_owners(void **context)
 
 static void check_gather(int ranks, comp_nodes nodes, comp_schedule schedule)
 {
-    const comp_route route = comp_route_of(schedule, ranks, nodes, 8);
+    const comp_route route = comp_make_route(schedule, ranks, nodes, 8);
     int *children = calloc((size_t)route.owners, sizeof *children);
     assert_non_null(children);
     for (int place = 1; place < route.owners; place++) {
@@ -312,7 +313,7 @@ static void check_gather(int ranks, comp_nodes nodes, comp_schedule schedule)
         children[parent]++;
     }
     for (int place = 0; place < route.owners; place++) {
-        assert_int_equal(comp_gather_children(&route, place), children[place]);
+        assert_int_equal(comp_count_gather_children(&route, place), children[place]);
         assert_true(children[place] < nodes.ranks + COMP_GATHER_FAN);
     }
     free(children);
@@ -337,10 +338,10 @@ static void cheapest_route_is_chosen(void **context)
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         const int ranks = counts[i], node = ranks % 8 == 0 && ranks > 8 ? 8 : 1;
         const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11, 256};
-        const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_default_machine);
+        const comp_route best = comp_find_fastest_route(ranks, (comp_nodes){node, false}, &load, &comp_default_machine);
         const comp_cost cost = comp_estimate_cost(&best, &load, &comp_default_machine);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
-            const comp_route other = comp_route_of(s, ranks, (comp_nodes){node, false}, 8);
+            const comp_route other = comp_make_route(s, ranks, (comp_nodes){node, false}, 8);
             assert_true(cost.seconds <= comp_estimate_cost(&other, &load, &comp_default_machine).seconds);
         }
         if (ranks <= 8) assert_int_equal(best.schedule, COMP_DIRECT);
@@ -354,11 +355,11 @@ static void route_costs_match_the_model(void **context)
     (void)context;
     const comp_machine machine = {1, 10, 100, 0, 0, 0};
     const comp_load load = {800, 2, 512};
-    const comp_route route = comp_route_of(COMP_DIRECT, 8, (comp_nodes){1, false}, 0);
+    const comp_route route = comp_make_route(COMP_DIRECT, 8, (comp_nodes){1, false}, 0);
     const comp_cost cost = comp_estimate_cost(&route, &load, &machine);
     assert_true(cost.messages == 7 && cost.bytes == 1400);
     assert_true(cost.seconds == 1 + 2 * 10 * 7 + 100 * 1400);
-    assert_int_equal(comp_route_messages(&route, 3), 7);
+    assert_int_equal(comp_count_route_messages(&route, 3), 7);
 }
 
 int main(void)

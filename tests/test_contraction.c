@@ -87,7 +87,7 @@ static void place_cell_vertices(batch *b, shape s, int lane)
                               draw_uniform(-0.5, 0.5) * (s != TINY)};
     double axes[3][3];
     make_random_axes(extent, axes);
-    for (int i = 0; i < grid_type_vertices(b->type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(b->type); i++) {
         static const float base[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
         const float *corner = b->type != GRID_PYRAMID ? kernel_cell_shape(b->type)->corners[i]
                               : i == 4                ? apex
@@ -105,7 +105,7 @@ static void place_cell_vertices(batch *b, shape s, int lane)
  * within their range and scaled to a maximum of 1, as by kernel_cell_subtract_isovalue(). */
 static void place_cell_values(batch *b, int lane)
 {
-    const int count = grid_type_vertices(b->type);
+    const int count = grid_type_vertex_count(b->type);
     const double noise = pow(10, draw_uniform(-3, 0.3)),
                  g[3] = {draw_uniform(-1, 1), draw_uniform(-1, 1), draw_uniform(-1, 1)};
     double v[8], low = INFINITY, high = -INFINITY, most = 0, size = 0;
@@ -127,7 +127,7 @@ static void choose_point_near_cell(const batch *b, int lane, double point[3])
 {
     for (int a = 0; a < 3; a++) {
         double low = INFINITY, high = -INFINITY;
-        for (int i = 0; i < grid_type_vertices(b->type); i++) {
+        for (int i = 0; i < grid_type_vertex_count(b->type); i++) {
             low = fmin(low, (double)b->at[a][i][lane]);
             high = fmax(high, (double)b->at[a][i][lane]);
         }
@@ -170,11 +170,11 @@ static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds
     kernel_map map;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
-    kernel_bounds_of(b->type, (const float(*)[8][SIMD_WIDTH])b->at, &b->beam, bounds);
+    kernel_compute_bounds_of_cells(b->type, (const float(*)[8][SIMD_WIDTH])b->at, &b->beam, bounds);
     kernel_contraction_set_ray(&cells, &b->rays, lanes, &c);
     kernel_contraction_set_cell(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_find_only_root_by_contraction, &c, vm_all_lanes(), out, none);
-    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
+    kernel_compute_maps((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
     out->t += vf_load(b->at[2][0]);
     kernel_refine_accurate_roots(&b->rays, &map, out->mask, out);
 }
@@ -183,7 +183,7 @@ static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds
 
 static void make_reference_cell(const batch *b, int lane, reference_cell *cell, reference_line *line, double values[8])
 {
-    *cell = (reference_cell){.type = b->type, .count = grid_type_vertices(b->type)};
+    *cell = (reference_cell){.type = b->type, .count = grid_type_vertex_count(b->type)};
     for (int i = 0; i < cell->count; i++) {
         values[i] = (double)b->at[3][i][lane];
         for (int a = 0; a < 3; a++) cell->world[i][a] = cell->position[i][a] = (double)b->at[a][i][lane];
@@ -251,7 +251,7 @@ typedef struct count {
 static double compute_depth_bound(const batch *b, int lane, double t)
 {
     double low = INFINITY, high = -INFINITY;
-    for (int i = 0; i < grid_type_vertices(b->type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(b->type); i++) {
         low = fmin(low, (double)b->at[2][i][lane]);
         high = fmax(high, (double)b->at[2][i][lane]);
     }
@@ -411,17 +411,18 @@ static vm find_wrong_quads(const vf x[8], const vf y[8], const signed char *loop
         around[i] = evaluate_edge(x, y, loop[i], loop[(i + 1) & 3], &least);
         side[i] = vm_sign(around[i]);
     }
-    const vm once = kernel_cross_one_triangle(side, vm_sign(evaluate_edge(x, y, loop[0], loop[2], &least)));
+    const vm once =
+        kernel_find_rays_crossing_one_triangle(side, vm_sign(evaluate_edge(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
     const vm bends = kernel_curved_may_cross_twice(x, y, loop, vm_all_lanes(), side);
-    return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
+    return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_are_on_same_side_of_edges(around, 4))), bends));
 }
 
 static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, quad_counts *n)
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
     vf x[8], y[8];
-    for (int i = 0; i < grid_type_vertices(b->type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(b->type); i++) {
         const vf z = vf_load(b->at[2][i]);
         x[i] = (vf_load(b->at[0][i]) - rays->origin_x) - rays->slope_x * z;
         y[i] = (vf_load(b->at[1][i]) - rays->origin_y) - rays->slope_y * z;

@@ -198,7 +198,7 @@ static void project_cell_bounds(const render_camera *c, const grid *g, int64_t c
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
         double world[3], p[3] = {0, 0, 0};
-        grid_vertex(g, vertex, world);
+        grid_read_vertex_position(g, vertex, world);
         for (int i = 0; i < 3; i++) {
             const double d = world[i] - c->eye[i];
             p[0] += d * c->right[i];
@@ -247,7 +247,7 @@ static bool is_folded(const grid *g, int64_t cell)
     double p[GRID_MAX_CELL_VERTICES][3];
     bool is_right = false, is_left = false;
     const int vertex_count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < vertex_count; i++) grid_vertex(g, vertices[i], p[i]);
+    for (int i = 0; i < vertex_count; i++) grid_read_vertex_position(g, vertices[i], p[i]);
     for (int i = 0; i < count; i++) {
         const double volume = corner_volume(p, corners[i]);
         is_right = is_right || volume > 0;

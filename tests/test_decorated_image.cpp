@@ -43,7 +43,7 @@ std::vector<float> draw_decorated(const std::vector<float> &rgba, const insitu_d
     std::vector<float> out = rgba;
     decorate(image, out);
     insitu_word_faults faults;
-    check_text(image, faults);
+    find_text_faults(image, faults);
     for (const char *fault : {faults.font, faults.letters, faults.room}) assert_string_equal(fault, "");
     return out;
 }

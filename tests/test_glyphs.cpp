@@ -64,7 +64,7 @@ std::vector<float> draw_text(const char *text, std::string &warning)
     std::vector<float> out = rgba;
     insitu_word_faults faults;
     decorate(image, out);
-    check_text(image, faults);
+    find_text_faults(image, faults);
     warning = faults.letters;
     std::vector<float> red;
     for (std::size_t i = 0; i < out.size(); i += 4) red.push_back(out[i]);
@@ -183,7 +183,7 @@ std::string find_font_error(const std::string &folders)
     what.words = &words;
     insitu_word_faults faults;
     setenv("OPENIMAGEIO_FONTS", folders.c_str(), 1);
-    check_text({width, height, nullptr, nullptr, &what, 0, nullptr, nullptr}, faults);
+    find_text_faults({width, height, nullptr, nullptr, &what, 0, nullptr, nullptr}, faults);
     unsetenv("OPENIMAGEIO_FONTS");
     return faults.font;
 }

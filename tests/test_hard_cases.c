@@ -59,7 +59,7 @@ static void add_collapsed_cells(test_mesh *mesh)
     mesh->connectivity = grow_array(mesh->connectivity, 8 * most, sizeof *mesh->connectivity);
     for (int64_t cell = 0; cell < cells; cell += 3) {
         const int64_t first = mesh->offsets[cell];
-        const int type = mesh->types[cell], count = grid_type_vertices(type);
+        const int type = mesh->types[cell], count = grid_type_vertex_count(type);
         for (int i = 0; i < count; i++)
             mesh->connectivity[mesh->connectivity_count++] =
                 mesh->connectivity[first + find_replacing_vertex(type, (collapse)(cell / 3 % COLLAPSE_COUNT), i)];

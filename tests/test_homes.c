@@ -57,7 +57,7 @@ static int check_homes_of_block(const block_rank *own, block_rank *neighbours, i
     for (int v = 0; v < 9 * 9 * 9; v++) {
         const double point[1][3] = {{low[0] + v % 9 / 8.0, low[1] + v / 9 % 9 / 8.0, low[2] + v / 81 / 8.0}};
         if (!session_is_in_other_box(&own->homes, point[0])) continue;
-        const int home = session_find_home(&own->homes, point, 1, hash_position(point[0]), 0);
+        const int home = session_find_home_rank(&own->homes, point, 1, hash_position(point[0]), 0);
         (*shared)++;
         homes += !is_home[home];
         is_home[home] = true;
@@ -68,7 +68,8 @@ static int check_homes_of_block(const block_rank *own, block_rank *neighbours, i
             bool has_it = true;
             for (int a = 0; a < 3; a++) has_it = has_it && box->lower[a] <= point[0][a] && point[0][a] <= box->upper[a];
             if (has_it)
-                assert_int_equal(session_find_home(&neighbours[n].homes, point, 1, hash_position(point[0]), 0), home);
+                assert_int_equal(session_find_home_rank(&neighbours[n].homes, point, 1, hash_position(point[0]), 0),
+                                 home);
         }
     }
     return homes;
@@ -113,7 +114,7 @@ static void home_ranks_by_id_match_partition_owners(void **state)
     for (int64_t id = -50; id < 100 * MOST_SHARES + 200; id++) {
         int expected = 0;
         while (expected + 1 < MOST_SHARES && firsts[expected + 1] <= id) expected++;
-        assert_int_equal(session_find_home(&homes, nowhere, 1, 0, id), owners[expected]);
+        assert_int_equal(session_find_home_rank(&homes, nowhere, 1, 0, id), owners[expected]);
     }
 }
 

@@ -179,8 +179,8 @@ static void differentiate_by_brute_force(const render_transfer *t, long double x
     out[5] = fabsl(slope);
 }
 
-/* Computes the four numbers that kernel_light_bounds() bounds, by brute force from many values in the range and
- * several background colours. */
+/* Computes the four numbers that kernel_look_up_light_error_bounds() bounds, by brute force from many values in the
+ * range and several background colours. */
 static void find_variation_by_brute_force(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };

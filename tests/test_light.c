@@ -44,7 +44,8 @@ static void copy_hits(const render_fixture *f, hits *out)
     out->open = calloc(most, sizeof *out->open);
     assert_true(out->hits && out->rays && out->open);
     for (int64_t i = 0; i < out->fragments.count; i++)
-        out->count += render_hit_of(&f->job, &out->fragments.items[i], &out->hits[out->count], &out->rays[out->count]);
+        out->count += render_make_hit_from_fragment(&f->job, &out->fragments.items[i], &out->hits[out->count],
+                                                    &out->rays[out->count]);
     memcpy(out->open, out->rays, most * sizeof *out->rays);
 }
 
@@ -189,7 +190,7 @@ static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float cont
         copy_hits(&f, &h);
         render_occluders *occluders;
         assert_int_equal(render_occluders_create(&f.job, &occluders, &error), INSITU_OK);
-        assert_int_equal(render_occlude(occluders, h.hits, h.open, h.count, &error), INSITU_OK);
+        assert_int_equal(render_clear_blocked_rays(occluders, h.hits, h.open, h.count, &error), INSITU_OK);
         render_occluders_free(occluders);
         for (int64_t i = 0; i < h.count; i++)
             if (test_is_long_run() || i % (set + 1 == fixture_isa_count() ? 2 : 7) == 0)

@@ -29,7 +29,7 @@ static const symmetry *get_symmetries(int type)
 static void reorder_vertices(test_mesh *mesh, int64_t cell, const int *order)
 {
     int64_t *v = mesh->connectivity + mesh->offsets[cell], old[8];
-    const int count = grid_type_vertices(mesh->types[cell]);
+    const int count = grid_type_vertex_count(mesh->types[cell]);
     memcpy(old, v, (size_t)count * sizeof *v);
     for (int i = 0; i < count; i++) v[i] = old[order[i]];
 }
@@ -93,7 +93,7 @@ void test_mesh_shuffle_cells(test_mesh *mesh, uint64_t seed)
             for (int64_t j = first; j < first + count; j++) mesh->connectivity[j] = face_to[mesh->connectivity[j]];
             continue;
         }
-        for (int j = 0; j < grid_type_vertices(old.types[from]); j++) renumbered[j] = vertex_to[v[j]];
+        for (int j = 0; j < grid_type_vertex_count(old.types[from]); j++) renumbered[j] = vertex_to[v[j]];
         mesh->ghosts[i] = old.ghosts[from];
         test_mesh_add_cell(mesh, old.types[from], renumbered, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
     }

@@ -101,7 +101,7 @@ typedef struct node_weights {
 static void list_nodes(const order_kind *kind, node_weights *out)
 {
     const insitu_cell_type linear = get_linear_type(kind->type);
-    const int corners = grid_type_vertices((int)linear);
+    const int corners = grid_type_vertex_count((int)linear);
     const insitu_vertex_order layout = kind->layout == INSITU_ORDER_VTK_BEFORE_9_1 ? V : kind->layout;
     const node_list *list = lists;
     while (list->type != linear || list->layout != layout) list++;
@@ -224,7 +224,7 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
 {
     const insitu_cell_type linear = get_linear_type(kind->type);
     const signed char(*cells)[8];
-    const int count = get_cells_of_cube(linear, &cells), corners = grid_type_vertices((int)linear);
+    const int count = get_cells_of_cube(linear, &cells), corners = grid_type_vertex_count((int)linear);
     node_weights *nodes = calloc(1, sizeof *nodes);
     if (kind->layout == L)
         make_loop_nodes(kind, nodes);

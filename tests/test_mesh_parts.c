@@ -85,7 +85,7 @@ void test_mesh_extract_part(const test_mesh *mesh, const int *owners, int rank, 
             copy_polyhedron_to_part(mesh, local, local_face, cell, out);
             continue;
         }
-        for (int i = 0; i < grid_type_vertices(mesh->types[cell]); i++)
+        for (int i = 0; i < grid_type_vertex_count(mesh->types[cell]); i++)
             vertices[i] = find_or_add_part_vertex(mesh, local, mesh->connectivity[mesh->offsets[cell] + i], out);
         test_mesh_add_cell(out, mesh->types[cell], vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
     }

@@ -33,7 +33,7 @@ static void refine_cell(const session_interpolation *of, const order_mesh *mesh,
     double *work = malloc(session_interpolation_work_size(of, 3) * sizeof *work);
     for (int n = 0; n < mesh->nodes; n++)
         memcpy(nodes[n], mesh->coordinates + 3 * mesh->connectivity[cell * mesh->nodes + n], sizeof nodes[n]);
-    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
+    for (int c = 0; c < grid_type_vertex_count(of->of.type); c++)
         memcpy(corners[c], nodes[of->corners[c]], sizeof corners[c]);
     session_interpolate(of, (const double(*)[3])corners, 3, nodes[0], work,
                         out->coordinates + 3 * out->mesh.vertex_count);

@@ -159,7 +159,7 @@ void test_mesh_make_single_cell(test_cell_shape shape, test_function *f, test_me
     const int type = get_shape_type(shape);
     const int64_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
     test_mesh_allocate(out, 8, 1, 8);
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         double p[3];
         compute_shape_vertex(shape, i, p);
         test_mesh_add_vertex(out, p);

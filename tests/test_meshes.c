@@ -103,7 +103,7 @@ void test_mesh_add_polyhedron(test_mesh *mesh, const int64_t *faces, int64_t cou
 
 void test_mesh_add_cell(test_mesh *mesh, int type, const int64_t *vertices, const int *picks)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     for (int i = 0; i < count; i++) mesh->connectivity[mesh->connectivity_count++] = vertices[picks[i]];
     mesh->types[mesh->cell_count++] = (unsigned char)type;
     mesh->offsets[mesh->cell_count] = mesh->connectivity_count;

@@ -23,7 +23,7 @@ static void compute_cell_geometry(const wave_mesh *mesh, int32_t cell, wave_cell
     const wave_cell_shape *shape = wave_mesh_cell(mesh, cell, v);
     for (int i = 0; i < shape->vertex_count; ++i) {
         id[i] = mesh->vertex_ids[v[i]];
-        wave_lattice_vertex(&mesh->partition.lattice, id[i], x[i]);
+        wave_lattice_compute_position(&mesh->partition.lattice, id[i], x[i]);
     }
     wave_cell_measure(shape, (const double(*)[3])x, id, out);
 }
@@ -99,12 +99,13 @@ static void centroids_of_flat_cells_are_exact(void **state)
         wave_lattice lattice = wave_lattice_make(sizes[2], (wave_cells)kind, 0);
         wave_cell cells[WAVE_CELLS_PER_CUBE];
         for (int64_t cube = 0; cube < wave_lattice_cube_count(&lattice); ++cube) {
-            int count = wave_lattice_cells(&lattice, cube, cells);
+            int count = wave_lattice_make_cells(&lattice, cube, cells);
             for (int c = 0; c < count; ++c) {
                 const wave_cell_shape *shape = wave_cell_shape_of(cells[c].type);
                 wave_cell_geometry g;
                 double x[8][3], exact[3];
-                for (int i = 0; i < shape->vertex_count; ++i) wave_lattice_vertex(&lattice, cells[c].vertex[i], x[i]);
+                for (int i = 0; i < shape->vertex_count; ++i)
+                    wave_lattice_compute_position(&lattice, cells[c].vertex[i], x[i]);
                 wave_cell_measure(shape, (const double(*)[3])x, cells[c].vertex, &g);
                 compute_exact_centroid(shape, x, exact);
                 /* tolerance: about 50 roundings of coordinates of at most 2 */
@@ -121,7 +122,7 @@ static void mixed_mesh_has_all_four_types(void **state)
     wave_cell cells[WAVE_CELLS_PER_CUBE];
     int seen[16] = {0};
     for (int64_t cube = 0; cube < wave_lattice_cube_count(&lattice); ++cube) {
-        int count = wave_lattice_cells(&lattice, cube, cells);
+        int count = wave_lattice_make_cells(&lattice, cube, cells);
         for (int c = 0; c < count; ++c) seen[cells[c].type]++;
     }
     assert_true(seen[10] && seen[12] && seen[13] && seen[14]);
@@ -154,7 +155,7 @@ static void check_cover(const wave_lattice *lattice, wave_partition_kind kind, i
     char *seen = calloc((size_t)ids, 1);
     wave_cell cells[WAVE_CELLS_PER_CUBE];
     for (int64_t cube = 0; cube < wave_lattice_cube_count(lattice); ++cube) {
-        expected += wave_lattice_cells(lattice, cube, cells);
+        expected += wave_lattice_make_cells(lattice, cube, cells);
     }
     for (int r = 0; r < ranks; ++r) {
         wave_mesh mesh;

@@ -70,8 +70,8 @@ static void compare_partitions(wave_cells cells, wave_partition_kind kind, const
     wave_lattice lattice = wave_lattice_make(size, cells, 0.2);
     wave_setup setup = *base;
     model part = {0}, whole = {0};
-    setup.medium = wave_medium_layered(&lattice);
-    setup.source = wave_source_default(&lattice, &setup.medium);
+    setup.medium = wave_medium_make_layered(&lattice);
+    setup.source = wave_source_make_default(&lattice, &setup.medium);
     setup.source.delay = 0.1;
     int ok = make_model(&whole, &lattice, WAVE_BLOCK, &setup, 4, MPI_COMM_SELF);
     ok = make_model(&part, &lattice, kind, &setup, index_bytes, MPI_COMM_WORLD) && ok;
@@ -112,9 +112,9 @@ static void moved_shared_vertices_stay_equal(void **state)
     (void)state;
     static const int size[3] = {4, 4, 4};
     wave_lattice lattice = wave_lattice_make(size, WAVE_MIXED, 0.1);
-    wave_setup setup = {.real_bytes = 4, .order = 2, .swell = 0.1, .medium = wave_medium_layered(&lattice)};
+    wave_setup setup = {.real_bytes = 4, .order = 2, .swell = 0.1, .medium = wave_medium_make_layered(&lattice)};
     model part = {0}, whole = {0};
-    setup.source = wave_source_default(&lattice, &setup.medium);
+    setup.source = wave_source_make_default(&lattice, &setup.medium);
     setup.source.delay = 0.1;
     int ok = make_model(&whole, &lattice, WAVE_BLOCK, &setup, 4, MPI_COMM_SELF);
     ok = make_model(&part, &lattice, WAVE_RANDOM, &setup, 4, MPI_COMM_WORLD) && ok;
@@ -126,7 +126,7 @@ static void moved_shared_vertices_stay_equal(void **state)
         int32_t at = wave_map_find(&found, part.mesh.vertex_ids[v]);
         const float *b = (const float *)whole.solver.grid.coordinates.values + 3 * (int64_t)at;
         double rest[3];
-        wave_lattice_vertex(&lattice, part.mesh.vertex_ids[v], rest);
+        wave_lattice_compute_position(&lattice, part.mesh.vertex_ids[v], rest);
         differences += memcmp(a, b, 3 * sizeof *a) != 0;
         moved += a[2] != (float)rest[2];
     }

@@ -238,7 +238,7 @@ static void mass_is_conserved_between_rigid_walls(void **state)
             wave_setup setup = make_uniform_setup(order);
             wave_lattice lattice = wave_lattice_make(size, (wave_cells)kind, 0.1);
             model m;
-            setup.medium = wave_medium_layered(&lattice);
+            setup.medium = wave_medium_make_layered(&lattice);
             make_model(&m, size, (wave_cells)kind, 0.1, &setup);
             set_pressure_bump(&m, 20);
             double before = wave_solver_compute_totals(&m.solver).mass;
@@ -259,7 +259,7 @@ static void source_adds_the_stated_volume(void **state)
     wave_setup setup = make_uniform_setup(2);
     model m;
     wave_lattice lattice = wave_lattice_make(size, WAVE_HEXES, 0);
-    setup.source = wave_source_default(&lattice, &setup.medium);
+    setup.source = wave_source_make_default(&lattice, &setup.medium);
     make_model(&m, size, WAVE_HEXES, 0, &setup);
     wave_solver_start(&m.solver);
     double injected = 0;
@@ -279,8 +279,8 @@ static void source_follows_steering_parameters(void **state)
     (void)state;
     const int size[3] = {4, 4, 4};
     const wave_lattice lattice = wave_lattice_make(size, WAVE_HEXES, 0);
-    const wave_medium medium = wave_medium_layered(&lattice);
-    const wave_source once = wave_source_default(&lattice, &medium);
+    const wave_medium medium = wave_medium_make_layered(&lattice);
+    const wave_source once = wave_source_make_default(&lattice, &medium);
     wave_source strong = once, again = once;
     strong.strength = 2;
     again.period = 2;
@@ -306,7 +306,7 @@ static void energy_does_not_increase(void **state)
             wave_setup setup = make_uniform_setup(order);
             wave_lattice lattice = wave_lattice_make(size, (wave_cells)kind, 0.2);
             model m;
-            setup.medium = wave_medium_layered(&lattice);
+            setup.medium = wave_medium_make_layered(&lattice);
             make_model(&m, size, (wave_cells)kind, 0.2, &setup);
             set_pressure_bump(&m, 20);
             double first = wave_solver_compute_totals(&m.solver).energy, last = first;
@@ -376,8 +376,8 @@ static void moving_mesh_inverts_no_cells(void **state)
     setup.real_bytes = 4;
     setup.reflecting = false;
     setup.swell = options.swell;
-    setup.medium = wave_medium_layered(&lattice);
-    setup.source = wave_source_default(&lattice, &setup.medium);
+    setup.medium = wave_medium_make_layered(&lattice);
+    setup.source = wave_source_make_default(&lattice, &setup.medium);
     make_model(&m, size, WAVE_TETS, 0, &setup);
     wave_solver_start(&m.solver);
     double least = 1, most = 1;

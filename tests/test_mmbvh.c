@@ -45,7 +45,7 @@ static void compute_cell_box(const lattice *l, const mmbvh *tree, int64_t cell, 
         upper[axis] = -INFINITY;
         for (int i = 0; i < count; i++) {
             double p[3];
-            grid_vertex(&l->g, vertices[i], p);
+            grid_read_vertex_position(&l->g, vertices[i], p);
             const double x = (p[axis] - tree->origin[axis]) * tree->scale;
             lower[axis] = fmin(lower[axis], x);
             upper[axis] = fmax(upper[axis], x);
@@ -356,7 +356,7 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
         assert_true(mmbvh_cost(&tree, NULL) == tree.built_cost);
         for (int64_t v = 0; v < l.g.vertex_count; v++) {
             double p[3];
-            grid_vertex(&l.g, v, p);
+            grid_read_vertex_position(&l.g, v, p);
             set_number(&l.g.coordinates[0], v, p[0] + 3 * sin(p[1]));
             set_number(&l.g.coordinates[2], v, p[2] * 1.5 - 7);
         }
@@ -582,7 +582,9 @@ static void point_query_finds_every_cell(void **state)
         double p[3];
         for (int axis = 0; axis < 3; axis++)
             p[axis] = 10 * hash_to_unit_interval((uint64_t)(1000 + 3 * n + axis)) - 0.5;
-        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* the first points are vertices, which lie at corners of boxes */
+        if (n < 50)
+            grid_read_vertex_position(&l.g, 13 * n,
+                                      p); /* the first points are vertices, which lie at corners of boxes */
         memset(met, 0, (size_t)l.g.cell_count * sizeof *met);
         int64_t stack[MMBVH_MAX_DEPTH + 1] = {0};
         for (int height = 1; height > 0;) {

@@ -107,12 +107,12 @@ typedef struct lattice_writer {
 static inline void write_cell(lattice_writer *w, int type, const signed char *corners)
 {
     lattice *l = w->l;
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         set_index(&l->g.connectivity, w->entries + i, w->corner[corners[i]]);
     }
     if (l->offsets) set_index(&l->g.offsets, w->cells, w->entries);
     if (l->types) l->types[w->cells * l->g.cell_types_stride] = (char)type;
-    w->entries += grid_type_vertices(type);
+    w->entries += grid_type_vertex_count(type);
     w->cells++;
 }
 

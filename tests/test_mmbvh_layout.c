@@ -159,7 +159,7 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
         uint64_t seed = 1;
         for (int64_t v = 0; v < l.g.vertex_count; v++) {
             double p[3];
-            grid_vertex(&l.g, v, p);
+            grid_read_vertex_position(&l.g, v, p);
             /* Shrinks the vertices 5 to 14 along each axis towards the middle. */
             for (int axis = 0; axis < 3; axis++) {
                 const double x = p[axis];
@@ -171,8 +171,8 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
         for (int64_t cell = l.g.cell_count - 1; cell > 0; cell--) {
             const int64_t other = (int64_t)(hash_to_unit_interval(seed++) * (double)(cell + 1));
             for (int k = 0; k < 8; k++) {
-                const int64_t a = grid_array_index(&l.g.connectivity, 8 * cell + k);
-                const int64_t b = grid_array_index(&l.g.connectivity, 8 * other + k);
+                const int64_t a = grid_read_index(&l.g.connectivity, 8 * cell + k);
+                const int64_t b = grid_read_index(&l.g.connectivity, 8 * other + k);
                 set_index(&l.g.connectivity, 8 * cell + k, b);
                 set_index(&l.g.connectivity, 8 * other + k, a);
             }
@@ -227,7 +227,7 @@ static void scale_mesh(lattice *l, double scale)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
         double p[3];
-        grid_vertex(&l->g, v, p);
+        grid_read_vertex_position(&l->g, v, p);
         for (int axis = 0; axis < 3; axis++) set_number(&l->g.coordinates[axis], v, p[axis] * scale);
     }
 }

@@ -28,7 +28,7 @@ static void move_vertices(lattice *l, double by)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
         double p[3];
-        grid_vertex(&l->g, v, p);
+        grid_read_vertex_position(&l->g, v, p);
         set_number(&l->g.coordinates[0], v, 9 + (1 - by) * (p[0] - 9));
         set_number(&l->g.coordinates[2], v, 9 + (1 - 2 * by) * (p[2] - 9));
     }
@@ -93,7 +93,7 @@ static node_view compute_leaf_box(const subject *s, int64_t leaf)
         const int count = grid_cell_vertices(&s->l.g, s->tree.cells[box.ref + k], vertices);
         for (int i = 0; i < count; i++) {
             double p[3];
-            grid_vertex(&s->l.g, vertices[i], p);
+            grid_read_vertex_position(&s->l.g, vertices[i], p);
             const node_view point = {.lower = {(float)p[0], (float)p[1], (float)p[2]},
                                      .upper = {(float)p[0], (float)p[1], (float)p[2]}};
             extend_bounds(&box, &point);

@@ -107,7 +107,7 @@ static void make_tuples(const bound_kind *kind, const cell_functions *of, double
     for (int i = 0; i < (p + 1) * (p + 1) * (p + 1); i++) {
         const int n[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
         if (!session_has_node(&kind->nodes, n[0], n[1], n[2])) continue;
-        const int at = session_node_index(&kind->nodes, kind->order, n[0], n[1], n[2]);
+        const int at = session_find_node_in_connectivity(&kind->nodes, kind->order, n[0], n[1], n[2]);
         double place[3];
         place_node(kind, n[0], n[1], n[2], place);
         for (int f = 0; f < 4 && at < kind->nodes.count; f++) tuples[at][f] = evaluate_function(of, f, place, -1);
@@ -126,7 +126,7 @@ typedef struct cut_cell {
 static void cut_cell_into_pieces(const bound_kind *kind, const cell_functions *of, int parts, cut_cell *out)
 {
     const int type = kind->nodes.type, r = parts * kind->nodes.order;
-    const session_nodes fine = session_complete_nodes(type, r);
+    const session_nodes fine = session_describe_complete_nodes(type, r);
     out->order = r;
     out->places = malloc((size_t)fine.count * sizeof *out->places);
     out->tuples = malloc((size_t)fine.count * sizeof *out->tuples);
@@ -135,7 +135,7 @@ static void cut_cell_into_pieces(const bound_kind *kind, const cell_functions *o
     for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
         const int n[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
         if (!session_has_node(&fine, n[0], n[1], n[2])) continue;
-        const int at = session_node_index(&fine, INSITU_ORDER_LEXICOGRAPHIC, n[0], n[1], n[2]);
+        const int at = session_find_node_in_connectivity(&fine, INSITU_ORDER_LEXICOGRAPHIC, n[0], n[1], n[2]);
         for (int a = 0; a < 3; a++) out->places[at][a] = (double)n[a] / r;
         for (int f = 0; f < 4; f++) out->tuples[at][f] = evaluate_function(of, f, out->places[at], -1);
     }
@@ -185,7 +185,7 @@ typedef struct piece_point {
 static piece_point interpolate_in_piece(const cut_cell *of, int type, const int *corners, const double local[3])
 {
     piece_point out = {{0}, {0}};
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     double weights[8];
     compute_corner_weights(type, local, weights);
     for (int c = 0; c < count; c++) {
@@ -207,13 +207,14 @@ static session_cell_bound compute_smallest_bound(const bound_kind *kind, const c
     assert_true(session_make_bound(&kind->nodes, kind->order, kind->is_lobatto, &bound));
     double *room = malloc(session_bound_work_size(&bound) * sizeof *room);
     make_tuples(kind, of, tuples);
-    session_cell_bound out = session_bound_cell(&bound, tuples[0], isovalues, 0, room);
+    session_cell_bound out = session_bound_cell_errors(&bound, tuples[0], isovalues, 0, room);
     for (int level = 1; level < bound.level_count && isovalues; level++)
         out.surface_error =
-            fmin(out.surface_error, session_bound_cell(&bound, tuples[0], isovalues, level, room).surface_error);
+            fmin(out.surface_error, session_bound_cell_errors(&bound, tuples[0], isovalues, level, room).surface_error);
     double values[MOST_NODES];
     for (int n = 0; n < kind->nodes.count && isovalues; n++) values[n] = tuples[n][3];
-    out.is_crossed = out.is_crossed && (!isovalues || session_may_cross(&bound, values, isovalues, room));
+    out.is_crossed =
+        out.is_crossed && (!isovalues || session_may_isosurface_cross_cell(&bound, values, isovalues, room));
     free(room);
     session_drop_bound(&bound);
     return out;
@@ -225,7 +226,7 @@ static double find_largest_position_error(const cell_functions *functions, const
     double worst = 0;
     const int *corners = of->pattern.piece_positions;
     for (int piece = 0; piece < of->pattern.piece_count; piece++) {
-        const int count = grid_type_vertices(of->pattern.types[piece]);
+        const int count = grid_type_vertex_count(of->pattern.types[piece]);
         for (int n = 0; n < points; n++) {
             double local[3], square = 0;
             choose_point_in_piece(of->pattern.types[piece], local);
@@ -276,12 +277,12 @@ static int list_kinds(bound_kind *out)
     int count = 0;
     for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++)
         for (int order = 2; order <= shapes[s].most_order; order++)
-            out[count++] = (bound_kind){shapes[s].name, session_complete_nodes(shapes[s].type, order),
+            out[count++] = (bound_kind){shapes[s].name, session_describe_complete_nodes(shapes[s].type, order),
                                         INSITU_ORDER_LEXICOGRAPHIC, false};
-    out[count++] =
-        (bound_kind){"hex, Gauss-Lobatto", session_complete_nodes(GRID_HEX, 4), INSITU_ORDER_LEXICOGRAPHIC, true};
-    out[count++] =
-        (bound_kind){"hex, Gauss-Lobatto", session_complete_nodes(GRID_HEX, 7), INSITU_ORDER_LEXICOGRAPHIC, true};
+    out[count++] = (bound_kind){"hex, Gauss-Lobatto", session_describe_complete_nodes(GRID_HEX, 4),
+                                INSITU_ORDER_LEXICOGRAPHIC, true};
+    out[count++] = (bound_kind){"hex, Gauss-Lobatto", session_describe_complete_nodes(GRID_HEX, 7),
+                                INSITU_ORDER_LEXICOGRAPHIC, true};
     static const int serendipity[][2] = {
         {INSITU_QUADRATIC_QUAD, 8}, {INSITU_QUADRATIC_HEX, 20}, {INSITU_QUADRATIC_WEDGE, 15}};
     for (int i = 0; i < 3; i++, count++) {
@@ -378,7 +379,7 @@ static double find_largest_surface_distance(const cell_functions *functions, con
             if (find_crossing(of, type, corners, value, &point))
                 worst = fmax(worst, compute_distance_to_surface(functions, point.at, value, point.tuple));
         }
-        corners += grid_type_vertices(type);
+        corners += grid_type_vertex_count(type);
     }
     return worst;
 }
@@ -459,7 +460,7 @@ static void isosurfaces_are_within_the_bound(void **state)
 static void crossings_between_nodes_are_found(void **state)
 {
     (void)state;
-    const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
+    const bound_kind kind = {"hex", session_describe_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
     cell_functions *of = calloc(1, sizeof *of);
     of->order = 2;
     for (int f = 0; f < 3; f++) add_linear_terms(f, (const double[]){f == 0, f == 1, f == 2}, of);
@@ -494,7 +495,7 @@ static void linear_cells_have_no_error(void **state)
 static void cells_with_infinite_values_have_no_bound(void **state)
 {
     (void)state;
-    const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
+    const bound_kind kind = {"hex", session_describe_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
     cell_functions *of = calloc(1, sizeof *of);
     const double value = 0.25;
     of->order = 2;

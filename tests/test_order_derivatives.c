@@ -200,17 +200,18 @@ static void finer_lattices_have_derivatives(void **state)
     static const int types[] = {GRID_TRIANGLE, GRID_QUAD, GRID_TET, GRID_WEDGE, GRID_HEX};
     for (int i = 0; i < 5 * 3 * 2; i++) {
         const int type = types[i % 5], p = 1 + i / 5 % 3, parts = 2 + i / 15, fine = parts * p;
-        const session_nodes of = session_complete_nodes(type, fine);
+        const session_nodes of = session_describe_complete_nodes(type, fine);
         double(*places)[3] = malloc((size_t)of.count * sizeof *places);
         session_derivatives d;
         for (int n = 0; n < (fine + 1) * (fine + 1) * (fine + 1); n++) {
             const int at[3] = {n % (fine + 1), n / (fine + 1) % (fine + 1), n / (fine + 1) / (fine + 1)};
             if (!session_has_node(&of, at[0], at[1], at[2])) continue;
-            double *place = places[session_node_index(&of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
+            double *place =
+                places[session_find_node_in_connectivity(&of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
             for (int a = 0; a < 3; a++) place[a] = (double)at[a] / fine;
         }
         assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, parts, &d));
-        session_nodes coarse = session_complete_nodes(type, p);
+        session_nodes coarse = session_describe_complete_nodes(type, p);
         const int most = 2 * coarse.count * d.axis_count * of.count;
         coarse.count = of.count; /* checks derivatives at all nodes, of polynomials of the lower order */
         check_derivatives("finer lattice", &coarse, &d, (const double(*)[3])places, 1);

@@ -199,7 +199,7 @@ static void check_cells(const char *name, const session_cell_rules *rules, const
         for (int n = 0; n < nodes; n++)
             for (int f = 0; f < FUNCTIONS; f++)
                 tuples[4 * n + f] = evaluate_function(of, f, places + 3 * (cell * nodes + n), -1);
-        session_visit_cell(rules, tuples, work, add_points, &sums);
+        session_visit_quadrature_points(rules, tuples, work, add_points, &sums);
     }
     const integrals expected = integrate_cube(of, (5 * rules->nodes.of.order + 1) / 2 + 1);
     check_integrals(name, &sums, &expected);
@@ -257,7 +257,7 @@ static void cells_between_lobatto_points_are_exact(void **state)
     for (int way = 0; way < 2; way++) {
         const int p = way ? 7 : 4, size = p + 1;
         const double *line = way ? of7 : of4;
-        const session_nodes nodes = session_complete_nodes(GRID_HEX, p);
+        const session_nodes nodes = session_describe_complete_nodes(GRID_HEX, p);
         for (int n = 0; n < nodes.count; n++) {
             const int at[3] = {n % size, n / size % size, n / size / size};
             for (int a = 0; a < 3; a++) places[3 * n + a] = line[at[a]];
@@ -274,7 +274,7 @@ static void bent_tets_of_order_7_are_exact(void **state)
     static const signed char cells[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
                                             {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
     static double places[6 * NODES][3];
-    const session_nodes nodes = session_complete_nodes(GRID_TET, ORDER);
+    const session_nodes nodes = session_describe_complete_nodes(GRID_TET, ORDER);
     int count = 0;
     for (int cell = 0; cell < 6; cell++)
         for (int k = 0; k <= ORDER; k++)
@@ -297,7 +297,7 @@ static void volumes_of_high_order_cells_are_exact(void **state)
 {
     (void)state;
     for (int p = 6; p <= 12; p += 3) {
-        const session_nodes nodes = session_complete_nodes(GRID_TET, p);
+        const session_nodes nodes = session_describe_complete_nodes(GRID_TET, p);
         session_cell_rules rules;
         integrals sums = {0};
         assert_true(session_make_cell_rules(&nodes, INSITU_ORDER_LEXICOGRAPHIC, false, &rules));
@@ -311,7 +311,7 @@ static void volumes_of_high_order_cells_are_exact(void **state)
                     memcpy(tuple, (const double[4]){at[0] + 0.3 * at[1], at[1] + 0.2 * at[2], 2 * at[2], pow(at[0], p)},
                            4 * sizeof *tuple);
                 }
-        session_visit_cell(&rules, tuples, work, add_points, &sums);
+        session_visit_quadrature_points(&rules, tuples, work, add_points, &sums);
         const int once[3] = {p, 0, 0}, twice[3] = {2 * p, 0, 0};
         const integrals expected = {2 / 6., 2 * integrate_monomial(3, once), 2 * integrate_monomial(3, twice)};
         check_integrals("tet", &sums, &expected);

@@ -64,7 +64,7 @@ static void check_monomial(const session_interpolation *of, const double (*place
     static const int corner_of_axis[2][3] = {{1, 2, 3}, {1, 3, 4}};
     double corners[8][3], worst = 0;
     const int p = of->fine.order, is_box = of->of.type == GRID_HEX || of->of.type == GRID_PYRAMID;
-    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
+    for (int c = 0; c < grid_type_vertex_count(of->of.type); c++)
         memcpy(corners[c], places[of->corners[c]], sizeof corners[c]);
     for (int n = 0; n < of->of.count; n++) {
         memcpy(tuples[n], places[n], sizeof places[n]);
@@ -76,7 +76,8 @@ static void check_monomial(const session_interpolation *of, const double (*place
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++) {
                 if (!session_has_node(&of->fine, i, j, k)) continue;
-                const double *at = fine[session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)];
+                const double *at =
+                    fine[session_find_node_in_connectivity(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)];
                 const int steps[3] = {i, j, k};
                 for (int a = 0; a < 3; a++) {
                     double place = corners[0][a];
@@ -193,14 +194,14 @@ static void check_rotated_cell(const session_interpolation *of, insitu_vertex_or
         const int at[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
         if (!session_has_node(&of->of, at[0], at[1], at[2])) continue;
         rotate_node(type, number, p, at, turned);
-        const int from = session_node_index(&of->of, order, at[0], at[1], at[2]);
-        const int to = session_node_index(&of->of, order, turned[0], turned[1], turned[2]);
+        const int from = session_find_node_in_connectivity(&of->of, order, at[0], at[1], at[2]);
+        const int to = session_find_node_in_connectivity(&of->of, order, turned[0], turned[1], turned[2]);
         if (from >= of->of.count) continue;
         for (int c = 0; c < 4; c++) tuples[0][from][c] = tuples[1][to][c] = draw_random_number();
     }
     for (int side = 0; side < 2; side++) {
         double corners[8][3];
-        for (int c = 0; c < grid_type_vertices(type); c++)
+        for (int c = 0; c < grid_type_vertex_count(type); c++)
             memcpy(corners[c], tuples[side][of->corners[c]], sizeof corners[c]);
         session_interpolate(of, (const double(*)[3])corners, 4, tuples[side][0], room, fine[side][0]);
     }
@@ -208,9 +209,10 @@ static void check_rotated_cell(const session_interpolation *of, insitu_vertex_or
         const int at[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
         if (!session_has_node(&of->fine, at[0], at[1], at[2])) continue;
         rotate_node(type, number, r, at, turned);
-        const double *a = fine[0][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
-        const double *b =
-            fine[1][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, turned[0], turned[1], turned[2])];
+        const double *a =
+            fine[0][session_find_node_in_connectivity(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
+        const double *b = fine[1][session_find_node_in_connectivity(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, turned[0],
+                                                                    turned[1], turned[2])];
         if (is_on_face(type, r, at)) wrong += memcmp(a, b, sizeof fine[0][0]) != 0;
         for (int c = 0; c < 4; c++) wrong += !(fabs(a[c] - b[c]) < 1e-12);
     }

@@ -50,7 +50,7 @@ template <typename Use> void for_each_node(const session_nodes &of, Use use)
 
 void expect_node_position(int type, const session_nodes &of, const double *theirs, int i, int j, int k)
 {
-    const int place = session_node_index(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
+    const int place = session_find_node_in_connectivity(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
     double at[3] = {static_cast<double>(i) / p, static_cast<double>(j) / p, static_cast<double>(k) / p};
     if (of.type == GRID_PYRAMID) {
         /* VTK's reference pyramid has its apex above the middle of the base. */
@@ -92,7 +92,7 @@ void lagrange_nodes_match_vtk(void **)
             std::vector<int> seen(static_cast<size_t>(count));
             for_each_node(of, [&](int i, int j, int k) {
                 expect_node_position(type, of, theirs, i, j, k);
-                seen[static_cast<size_t>(session_node_index(&of, INSITU_ORDER_VTK, i, j, k))]++;
+                seen[static_cast<size_t>(session_find_node_in_connectivity(&of, INSITU_ORDER_VTK, i, j, k))]++;
             });
             for (const int times : seen) assert_int_equal(times, 1);
         }
@@ -120,11 +120,11 @@ void old_hexes_have_two_edges_swapped(void **)
         assert_true(session_describe_nodes(INSITU_LAGRANGE_HEX, session_node_count(INSITU_LAGRANGE_HEX, p), &of));
         const int r = p - 1, first = 8 + 10 * r;
         for_each_node(of, [&](int i, int j, int k) {
-            const int now = session_node_index(&of, INSITU_ORDER_VTK, i, j, k);
+            const int now = session_find_node_in_connectivity(&of, INSITU_ORDER_VTK, i, j, k);
             int old = now;
             if (now >= first && now < first + r) old += r;
             if (now >= first + r && now < first + 2 * r) old -= r;
-            assert_int_equal(session_node_index(&of, INSITU_ORDER_VTK_BEFORE_9_1, i, j, k), old);
+            assert_int_equal(session_find_node_in_connectivity(&of, INSITU_ORDER_VTK_BEFORE_9_1, i, j, k), old);
         });
     }
 }
@@ -141,7 +141,7 @@ void node_positions_are_permutations(void **)
                 if (session_describe_unsupported_node_order(&of, order)) continue;
                 std::vector<int> seen(static_cast<size_t>(of.count));
                 for_each_node(of, [&](int i, int j, int k) {
-                    const int place = session_node_index(&of, order, i, j, k);
+                    const int place = session_find_node_in_connectivity(&of, order, i, j, k);
                     assert_in_range(place, 0, of.count - 1);
                     seen[static_cast<size_t>(place)]++;
                 });

@@ -122,7 +122,7 @@ static void check_volumes_add_up(const grid *g, bool is_mirrored)
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         double points[GRID_MAX_CELL_VERTICES][3];
         const int count = grid_cell_vertices(g, cell, vertices);
-        for (int i = 0; i < count; i++) grid_vertex(g, vertices[i], points[i]);
+        for (int i = 0; i < count; i++) grid_read_vertex_position(g, vertices[i], points[i]);
         const double volume = tally_signed_volume(grid_cell_type(g, cell), points);
         assert_true(is_mirrored ? volume < 0 : volume > 0);
         sum += fabs(volume);

@@ -150,7 +150,7 @@ static void make_subject(const render_fixture *f, subject *s)
     s->cell.type = GRID_POLYHEDRON;
     reference_polyhedron_read(g, 0, &s->cell, vertices);
     for (int i = 0; i < s->cell.count; i++) {
-        grid_vertex(g, vertices[i], s->cell.world[i]);
+        grid_read_vertex_position(g, vertices[i], s->cell.world[i]);
         s->values[i] = grid_field_value(&f->fields[0], vertices[i]);
         for (int a = 0; a < 3; a++) {
             s->cell.position[i][a] = 0;

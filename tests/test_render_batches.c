@@ -55,9 +55,9 @@ static void single_cells_add(single_cells *all, const render_fixture *f, int mes
     base_error error = {0};
     *one = f->views[mesh].cells;
     if (one->offsets.data)
-        one->connectivity.data += grid_array_index(&one->offsets, cell) * one->connectivity.stride;
+        one->connectivity.data += grid_read_index(&one->offsets, cell) * one->connectivity.stride;
     else
-        one->connectivity.data += cell * grid_type_vertices(one->cell_type) * one->connectivity.stride;
+        one->connectivity.data += cell * grid_type_vertex_count(one->cell_type) * one->connectivity.stride;
     one->cell_type = grid_cell_type(&f->views[mesh].cells, cell);
     one->cell_types = one->ghosts = NULL;
     one->offsets = (grid_array){0};

@@ -24,7 +24,7 @@ static int sample_values_on_ray(const render_fixture *f, const test_mesh *mesh, 
 {
     const render_camera *camera = &f->job.camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
-    reference_cell cell = {.type = type, .count = grid_type_vertices(type)};
+    reference_cell cell = {.type = type, .count = grid_type_vertex_count(type)};
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     reference_line line;
     double base[3], direction[3];

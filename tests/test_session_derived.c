@@ -498,7 +498,7 @@ static void velocities_at_cells_and_corners_are_supported(void **state)
         const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
         for (int64_t v = 0; v < session_vertex_count(mesh); v++) {
             double p[3];
-            grid_vertex(&mesh->cells, v, p);
+            grid_read_vertex_position(&mesh->cells, v, p);
             if (!is_of_corners && fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))) > 0.5) continue;
             count++;
             worst =

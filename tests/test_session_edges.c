@@ -54,7 +54,8 @@ static body make_body(const grid *g, bool is_cube)
             const session_face_loop loop = session_find_face_loop(&faces, f);
             polygon face = {.count = (int)loop.size};
             bool is_on = !is_cube;
-            for (int i = 0; i < face.count; i++) grid_vertex(g, session_face_vertex(&loop, i), face.corners[i]);
+            for (int i = 0; i < face.count; i++)
+                grid_read_vertex_position(g, session_face_vertex(&loop, i), face.corners[i]);
             for (int side = 0; side < 6; side++) {
                 int count = 0;
                 for (int i = 0; i < face.count; i++) count += face.corners[i][side / 2] == side % 2 * 2 - 1;

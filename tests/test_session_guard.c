@@ -32,13 +32,13 @@ static void divide_by_zero_on_threads(int threads)
 /* Starts a team of threads as the session does before its first parallel region with this number of threads. */
 static void start_threads(const session_guard *guard, int threads)
 {
-    session_guard_suspend(guard);
+    session_guard_set_caller_fenv(guard);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
         region_leave();
     }
-    session_guard_resume();
+    session_guard_set_default_fenv();
 }
 
 static void enable_traps(void)
@@ -70,9 +70,9 @@ static void floating_point_traps_are_disabled_inside(void **state)
     enable_traps(); /* for OpenMP libraries whose workers inherit the calling thread's settings */
 #pragma omp parallel num_threads(THREADS)
     enable_traps(); /* for OpenMP libraries whose workers keep their own settings */
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     divide_by_zero_on_threads(THREADS); /* without the guard, this terminates the process */
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     disable_and_count_traps(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
     assert_int_equal(flagged, 0);
@@ -87,10 +87,10 @@ static void threads_started_inside_inherit_the_callers_settings(void **state)
     enable_traps();
 #pragma omp parallel num_threads(THREADS)
     enable_traps();
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     start_threads(&guard, 2 * THREADS);
     divide_by_zero_on_threads(2 * THREADS);
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     disable_and_count_traps(2 * THREADS, &armed, &flagged);
     assert_int_equal(armed, 2 * THREADS);
     assert_int_equal(flagged, 0);
@@ -104,7 +104,7 @@ static void workers_restore_their_settings_between_regions(void **state)
     int nearest = 0, upward = 0;
 #pragma omp parallel num_threads(THREADS)
     fesetround(FE_UPWARD);
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     for (int turn = 0; turn < 2; turn++) {
 #pragma omp parallel num_threads(THREADS) reduction(+ : nearest)
         {
@@ -117,7 +117,7 @@ static void workers_restore_their_settings_between_regions(void **state)
     fesetround(FE_UPWARD);
 #pragma omp parallel num_threads(THREADS) reduction(+ : upward)
     upward += fegetround() == FE_UPWARD;
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     assert_int_equal(nearest, 2 * THREADS);
     assert_int_equal(upward, THREADS);
 #pragma omp parallel num_threads(THREADS)
@@ -129,9 +129,9 @@ static void rounding_is_to_nearest_inside(void **state)
     (void)state;
     session_guard guard;
     fesetround(FE_UPWARD);
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     assert_int_equal(fegetround(), FE_TONEAREST);
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     assert_int_equal(fegetround(), FE_UPWARD);
     fesetround(FE_TONEAREST);
 }
@@ -143,9 +143,9 @@ static void thread_teams_have_one_size_inside(void **state)
     for (int is_dynamic = 0; is_dynamic < 2; is_dynamic++) {
         session_guard guard;
         omp_set_dynamic(is_dynamic);
-        session_guard_begin(&guard);
+        session_guard_save_settings(&guard);
         assert_false(omp_get_dynamic());
-        session_guard_end(&guard);
+        session_guard_restore_settings(&guard);
         assert_int_equal(omp_get_dynamic(), is_dynamic);
     }
     omp_set_dynamic(0);

@@ -87,7 +87,7 @@ static void add_cell(const grid *g, int64_t cell, truth *t)
     for (int axis = 0; axis < 3; axis++) {
         double low = (double)INFINITY, high = -(double)INFINITY;
         for (int i = 0; i < count; i++) {
-            const double x = grid_array_number(&g->coordinates[axis], vertices[i]);
+            const double x = grid_read_number(&g->coordinates[axis], vertices[i]);
             p[i][axis] = x;
             low = fmin(x, low);
             high = fmax(x, high);
@@ -154,7 +154,7 @@ static lane_sums compute_lane_sums(cpu_isa isa, const lane_cells *cells, int64_t
 
 static void assert_sums_of_cell_range(const grid *g, int64_t first, int64_t count)
 {
-    const int vertices = grid_type_vertices(g->cell_type);
+    const int vertices = grid_type_vertex_count(g->cell_type);
     const lane_cells cells = {g, g->cell_type, first, count, first * vertices};
     const truth t = compute_sums_by_brute_force(g, first, count - count % LANES);
     lane_sums plain;
@@ -344,7 +344,7 @@ static void volumes_in_lanes_match_single_cells(void **state)
                 make_ghost(&view.cells, cell);
             session_mesh mesh = {.cells = view.cells};
             for (int64_t cell = 0; cell < view.cells.cell_count; cell++)
-                mesh.topology.connectivity_count += grid_type_vertices(grid_cell_type(&view.cells, cell));
+                mesh.topology.connectivity_count += grid_type_vertex_count(grid_cell_type(&view.cells, cell));
             mesh_tally all = tally_empty(), each = tally_empty();
             const tally_run run = tally_choose_check_function(&mesh);
             assert_non_null(run);

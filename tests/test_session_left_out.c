@@ -186,7 +186,7 @@ static void compute_flat_position(int type, double corners[4][3], int i, double 
  * half. */
 static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < count; i++) {
         double place[3];

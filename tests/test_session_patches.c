@@ -75,7 +75,7 @@ static double compute_face_value(const boundary_face *face)
 
 static int read_loop(const grid *g, const session_face_loop *loop, double points[8][3])
 {
-    for (int64_t i = 0; i < loop->size; i++) grid_vertex(g, session_face_vertex(loop, i), points[i]);
+    for (int64_t i = 0; i < loop->size; i++) grid_read_vertex_position(g, session_face_vertex(loop, i), points[i]);
     return (int)loop->size;
 }
 
@@ -158,7 +158,7 @@ static void list_boundary_faces_by_cells(part_input *in, const grid *g)
             for (int i = 0; i < count; i++) vertices[offsets[at] + i] = session_face_vertex(&loop, i);
             offsets[at + 1] = offsets[at] + count;
             if (g->connectivity.data && of_cell.table == NULL)
-                in->numbers[face.patch][at] = grid_array_index(&g->connectivity, of_cell.first + f);
+                in->numbers[face.patch][at] = grid_read_index(&g->connectivity, of_cell.first + f);
             add_value(in, face.patch, grid_is_ghost(g, cell) ? RUBBISH : compute_face_value(&face));
         }
     }
@@ -272,7 +272,7 @@ static bool are_means_right(const insitu_session *session)
     }
     for (int64_t v = 0; is_right && v < mesh->cells.vertex_count; v++) {
         double position[3];
-        grid_vertex(&mesh->cells, v, position);
+        grid_read_vertex_position(&mesh->cells, v, position);
         const double expected = is_drawn[v] ? compute_expected_mean(&view.cells, position) : NAN,
                      found = scalar->vertex_values[v];
         if ((isnan(expected) && isnan(found)) || memcmp(&expected, &found, sizeof found) == 0) continue;

@@ -76,7 +76,7 @@ static face_set find_faces_by_brute_force(const test_mesh *mesh, const grid *g, 
             const session_face_loop loop = session_find_face_loop(&of, f);
             double place[3];
             for (int64_t i = 0; i < loop.size; i++) {
-                grid_vertex(g, session_face_vertex(&loop, i), place);
+                grid_read_vertex_position(g, session_face_vertex(&loop, i), place);
                 faces[count] += hash_position(place);
             }
             count++;

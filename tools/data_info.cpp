@@ -160,7 +160,7 @@ data_summary summarize(vtkDataObject *data)
 }
 
 /* Converts "vtkQuadraticTetra" to "QuadraticTetra". VTK 9.1 has wrong class names for types from 60 on. */
-std::string cell_name(int type)
+std::string make_cell_type_name(int type)
 {
     static const char *const orders[] = {"Lagrange", "Bezier"};
     static const char *const shapes[] = {"Curve",      "Triangle", "Quadrilateral", "Tetrahedron",
@@ -213,7 +213,8 @@ void print_info(const std::string &title, vtkDataObject *data, const std::vector
     std::printf(", %lld cells, %lld points (%s)\n", static_cast<long long>(cells), static_cast<long long>(all.points),
                 all.point_type.empty() ? "none" : all.point_type.c_str());
     for (const auto &[type, count] : all.cells)
-        std::printf("  cells  %-24s type %d  %lld\n", cell_name(type).c_str(), type, static_cast<long long>(count));
+        std::printf("  cells  %-24s type %d  %lld\n", make_cell_type_name(type).c_str(), type,
+                    static_cast<long long>(count));
     if (all.hidden_cells > 0)
         std::printf("  cells  %-24s %lld\n", "hidden or ghosts", static_cast<long long>(all.hidden_cells));
     if (all.bounds.IsValid()) {

@@ -75,7 +75,7 @@ void add_names(vtkFieldData *fields, std::vector<std::string> &names)
 }
 
 /* Returns the names of all fields: those of points first. */
-std::vector<std::string> names_of_fields(const grid_list &grids)
+std::vector<std::string> list_field_names(const grid_list &grids)
 {
     std::vector<std::string> names;
     for (vtkUnstructuredGrid *grid : grids) add_names(grid->GetPointData(), names);
@@ -128,7 +128,8 @@ struct visible_value {
 };
 
 /* Returns twice the projected area of a face in the viewing direction; negative if it points away from the viewer. */
-double projected_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, const vector &to_viewer)
+double compute_twice_projected_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points,
+                                    const vector &to_viewer)
 {
     vector first{}, last{};
     faces->GetPoint(points[0], first.data());
@@ -162,7 +163,7 @@ void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, cons
         vtkIdType count = 0;
         const vtkIdType *points = nullptr;
         faces->GetCellPoints(f, count, points);
-        const double area = count < 3 ? 0 : projected_area(faces, count, points, to_viewer);
+        const double area = count < 3 ? 0 : compute_twice_projected_area(faces, count, points, to_viewer);
         double value = is_at_points ? 0 : find_tuple_value(values, f);
         for (vtkIdType k = 0; is_at_points && k < count; k++)
             value += find_tuple_value(values, points[k]) / static_cast<double>(count);
@@ -172,7 +173,7 @@ void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, cons
 
 /* Returns how much of the field the outer surface shows: the length of the interval between the 5th and the 95th
  * percentile of its values, as a fraction of the field's range. Returns 1 if it cannot be computed. */
-double visible_range_fraction(const grid_list &grids, const std::string &field, const vector &to_viewer)
+double compute_visible_range_fraction(const grid_list &grids, const std::string &field, const vector &to_viewer)
 {
     double low = std::numeric_limits<double>::infinity(), high = -low, area = 0, below = 0;
     std::vector<visible_value> visible;
@@ -202,7 +203,7 @@ double visible_range_fraction(const grid_list &grids, const std::string &field, 
 /* Returns the normal of the best cut. Of the three planes through the centre that are perpendicular to an axis, the
  * best one has the largest projected area within the bounds, as seen by the viewer. The normal points towards the
  * viewer. */
-std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewer)
+std::array<int, 3> choose_cut_normal(const vtkBoundingBox &bounds, const vector &to_viewer)
 {
     std::array<int, 3> cut = {0, 0, 0};
     double most = 0;
@@ -218,7 +219,7 @@ std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewe
     return cut;
 }
 
-vtkSmartPointer<vtkDataObject> read_whole(const step_source &source, size_t step)
+vtkSmartPointer<vtkDataObject> read_whole_step(const step_source &source, size_t step)
 {
     const std::string &path = source.path(step);
     return grids_of(open_data_file(path)->read(source.index_in_file(step), 0, 1), path);
@@ -245,14 +246,14 @@ std::array<double, 3> up_direction(const options &o)
 
 default_look choose_look(const options &o, const step_source &source)
 {
-    const auto data = read_whole(source, 0);
+    const auto data = read_whole_step(source, 0);
     const grid_list grids = list_grids(data);
     default_look look;
     look.field = o.field;
     if (o.field.empty()) {
-        const std::vector<std::string> names = names_of_fields(grids);
+        const std::vector<std::string> names = list_field_names(grids);
         const size_t last = source.count() - 1;
-        look.field = choose_field(names, last ? names_of_fields(list_grids(read_whole(source, last))) : names);
+        look.field = choose_field(names, last ? list_field_names(list_grids(read_whole_step(source, last))) : names);
     }
     vtkBoundingBox bounds;
     int dimension = 0;
@@ -263,8 +264,8 @@ default_look choose_look(const options &o, const step_source &source)
     for (int axis = 0; dimension == 2 && axis < 3; axis++)
         if (bounds.GetLength(axis) <= 1e-6 * bounds.GetMaxLength()) look.flat_axis = axis;
     const vector to_viewer = eye_direction(o);
-    if (dimension == 3 && !o.whole && visible_range_fraction(grids, look.field, to_viewer) < interior_threshold)
-        look.cut = best_cut(bounds, to_viewer);
+    if (dimension == 3 && !o.whole && compute_visible_range_fraction(grids, look.field, to_viewer) < interior_threshold)
+        look.cut = choose_cut_normal(bounds, to_viewer);
     return look;
 }
 

@@ -201,7 +201,8 @@ std::string milliseconds(double ms)
 
 /* Returns the line that describes the step: cells that are not hidden are summed over ranks, and times are the maximum
  * over ranks. Collective. */
-std::string step_line(const rank_info &w, const insitu_report &r, const std::string &name, double time, double read_ms)
+std::string format_step_line(const rank_info &w, const insitu_report &r, const std::string &name, double time,
+                             double read_ms)
 {
     const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
     double times[9] = {r.prepare_ms,   r.build_ms, r.refit_ms, r.surface_ms, r.volume_ms,
@@ -223,7 +224,7 @@ std::string step_line(const rank_info &w, const insitu_report &r, const std::str
 }
 
 /* If there is no scene file, replaces the message about a missing field by one that names the option --field. */
-std::string name_missing_option(const options &o, const std::string &missing)
+std::string suggest_field_option(const options &o, const std::string &missing)
 {
     const size_t reason = missing.find("no mesh has the field");
     if (!o.scene.empty() || reason == std::string::npos) return missing;
@@ -250,12 +251,12 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
     if (missing.empty()) {
         run.complete_steps++;
     } else {
-        run.missing = name_missing_option(run.given, missing);
+        run.missing = suggest_field_option(run.given, missing);
         if (source.count() > 1 && w.is_root()) warnings += name + ": not drawn: " + run.missing + "\n";
     }
     if (done.warnings) warnings += done.warnings;
     run.images += done.images;
-    bar.line(step_line(w, done, name, part.time, read_time.count()));
+    bar.line(format_step_line(w, done, name, part.time, read_time.count()));
     show_warnings(w, warnings, run, bar);
 }
 
@@ -280,7 +281,7 @@ data_extent find_extent(const rank_info &w, step_source &source, const std::stri
 
 /* Returns the text of the default scene, on rank 0. All steps are read in advance, so that the colour range and the
  * camera are the same for all of them. Collective. */
-std::string text_of_default(const rank_info &w, const options &o, step_source &source)
+std::string make_default_scene_text(const rank_info &w, const options &o, step_source &source)
 {
     default_look look;
     run_on_all_ranks(w, [&] {
@@ -301,7 +302,7 @@ void draw(const rank_info &w, const options &o)
     std::unique_ptr<step_source> source;
     run_on_all_ranks(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
     const bool is_text = o.scene.empty();
-    render_session on(w, is_text ? text_of_default(w, o, *source) : o.scene, is_text);
+    render_session on(w, is_text ? make_default_scene_text(w, o, *source) : o.scene, is_text);
     run_state run{o, {}, 0, 0, ""};
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);

@@ -98,7 +98,7 @@ struct numbered_name {
     }
 };
 
-void order_by_number(std::vector<std::string> &files)
+void sort_files_by_number(std::vector<std::string> &files)
 {
     const std::vector<numbered_name> names(files.begin(), files.end());
     auto like_first = [&](const numbered_name &n) { return n.shape == names[0].shape; };
@@ -238,7 +238,7 @@ void extract_scene(std::vector<std::string> &names, options &o)
     if (names.empty()) throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
     auto scene = std::find_if(names.begin(), names.end(), is_scene);
     if (scene == names.end()) {
-        const std::string why_not = why_not_data(names.front());
+        const std::string why_not = find_reason_not_data(names.front());
         if (why_not.empty()) return;
         if (names.size() == 1 || has_known_ending(names.front())) throw std::runtime_error(why_not);
         scene = names.begin();
@@ -272,7 +272,7 @@ options parse_options(int argc, char **argv)
     if (names.empty()) throw std::runtime_error("data files are missing; see insitu-render --help");
     o.files = names;
     keep_one_file_per_run(o);
-    if (!o.pieces) order_by_number(o.files);
+    if (!o.pieces) sort_files_by_number(o.files);
     return o;
 }
 

@@ -26,10 +26,11 @@ std::string file_name(const std::string &path)
 
 /* Returns a warning if a run whose mesh changes continues in a file next to this one (run.e-s002) that was not given;
  * otherwise "". */
-std::string next_file_warning(const std::string &file, const std::vector<std::string> &given)
+std::string make_next_file_warning(const std::string &file, const std::vector<std::string> &given)
 {
     const std::string next = file + "-s002";
-    if (!has_known_ending(next) || std::count(given.begin(), given.end(), next) > 0 || !why_not_data(next).empty())
+    if (!has_known_ending(next) || std::count(given.begin(), given.end(), next) > 0 ||
+        !find_reason_not_data(next).empty())
         return "";
     return file + ": the run goes on in " + file_name(next) + ", which is not given\n";
 }
@@ -39,9 +40,9 @@ std::string next_file_warning(const std::string &file, const std::vector<std::st
 step_source::step_source(const options &o, int rank, int ranks) : options_(o), rank_(rank), ranks_(ranks)
 {
     for (const std::string &file : o.files) {
-        const std::string why_not = why_not_data(file);
+        const std::string why_not = find_reason_not_data(file);
         if (!why_not.empty()) throw std::runtime_error(why_not);
-        warnings_ += next_file_warning(file, o.files);
+        warnings_ += make_next_file_warning(file, o.files);
     }
     int64_t cycle = 0;
     const size_t file_count = o.pieces ? 1 : o.files.size();
@@ -86,7 +87,8 @@ vtkSmartPointer<vtkDataObject> step_source::read_pieces(std::string &warnings)
     for (int64_t f = 0; f < files; f++) {
         if (keeps_whole_files() && f * ranks_ / files != rank_) continue;
         const auto file = static_cast<size_t>(f);
-        all->SetBlock(static_cast<unsigned>(f), drawable_data_of(open(file).read(0, 0, 1), options_.files[file]));
+        all->SetBlock(static_cast<unsigned>(f),
+                      convert_to_drawable_data(open(file).read(0, 0, 1), options_.files[file]));
         warnings += open(file).take_warnings();
     }
     if (keeps_whole_files()) return all;
@@ -108,9 +110,9 @@ step_source::result step_source::read(size_t index)
     const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces(s.inside) >= ranks_;
     const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
     r.warnings += file.take_warnings();
-    r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
+    r.time = s.inside < file.times().size() ? file.times()[s.inside] : get_time_of_data(data, fallback);
     if (!data) return r;
-    const auto drawable = drawable_data_of(data, file.step_path(s.inside));
+    const auto drawable = convert_to_drawable_data(data, file.step_path(s.inside));
     r.data = is_by_pieces ? drawable : distribute_cells(drawable, options_.how, rank_, ranks_);
     return r;
 }

@@ -183,7 +183,7 @@ static insitu_status set_known_mesh(insitu_blueprint *adaptor, blueprint_mesh *m
 {
     const mesh_target target = target_of(adaptor, known);
     bool is_level;
-    known->uniform = uniform_block_of(mesh);
+    known->uniform = describe_uniform_block(mesh);
     if (known->uniform.exists)
         mesh->lattice =
             uniform_block_place(&known->uniform, named_lattices_find(&adaptor->common, known->name_hash), &is_level);
@@ -352,7 +352,7 @@ static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank, b
 }
 
 /* Returns the error of the rank failed_rank on all ranks. */
-static insitu_status share_error(insitu_blueprint *adaptor, int failed_rank)
+static insitu_status broadcast_error(insitu_blueprint *adaptor, int failed_rank)
 {
     int status = (int)adaptor->log.status;
     char message[NODE_MESSAGE];
@@ -448,7 +448,7 @@ static insitu_status agree_on_step(insitu_blueprint *adaptor)
     named_lattices list = list_lattices(adaptor);
     bool is_new = !named_lattices_are_same(&list, &adaptor->lattices);
     insitu_status status = reduce_state(adaptor, &failed_rank, &is_new);
-    if (!status && failed_rank >= 0) status = share_error(adaptor, failed_rank);
+    if (!status && failed_rank >= 0) status = broadcast_error(adaptor, failed_rank);
     if (!status && is_new) status = agree_on_lattices(adaptor, &list);
     named_lattices_free(&list);
     return status;

@@ -28,7 +28,7 @@ static const shape *find_shape(const char *name)
     return NULL;
 }
 
-static bool fail_shape(const node *of, const char *path, const char *name)
+static bool set_unknown_shape_error(const node *of, const char *path, const char *name)
 {
     return node_set_error(
         of, path, INSITU_ERROR_MESH,
@@ -36,20 +36,20 @@ static bool fail_shape(const node *of, const char *path, const char *name)
 }
 
 /* Reads an optional array of integers. If it is missing, out->count is -1. */
-static bool find_integers(const node *parent, const char *path, node_array *out)
+static bool read_optional_integers(const node *parent, const char *path, node_array *out)
 {
     node found;
     *out = (node_array){.count = -1};
     if (!node_find(parent, path, &found)) return true;
     if (!node_read_array(&found, out)) return false;
-    return node_is_integers(out) || out->count == 0 ||
+    return node_is_integer_array(out) || out->count == 0 ||
            node_set_error(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
 }
 
-static bool require_integers(const node *parent, const char *path, node_array *out)
+static bool read_required_integers(const node *parent, const char *path, node_array *out)
 {
     if (!node_has(parent, path)) return node_set_error(parent, path, INSITU_ERROR_MESH, "is missing");
-    return find_integers(parent, path, out);
+    return read_optional_integers(parent, path, out);
 }
 
 /* ---- cells and faces with different numbers of vertices --------------------------------------------------------- */
@@ -68,7 +68,7 @@ static int64_t row_size(const row_list *rows, int64_t i)
 }
 
 /* Computes the offsets of the lists from their sizes, for a node without offsets. */
-static bool make_offsets(const node *of, row_list *rows, owned_arrays *owned)
+static bool compute_row_offsets(const node *of, row_list *rows, owned_arrays *owned)
 {
     const int64_t bytes = rows->count * (int64_t)sizeof(int64_t);
     int64_t *offsets = owned_arrays_add(of, owned, bytes), sum = 0;
@@ -105,14 +105,15 @@ static bool check_offsets(const node *of, const row_list *rows)
  * sizes are then required only if it is 0. */
 static bool read_rows(const node *of, row_list *rows, owned_arrays *owned)
 {
-    if (!require_integers(of, "connectivity", &rows->connectivity)) return false;
-    if (!find_integers(of, "sizes", &rows->sizes) || !find_integers(of, "offsets", &rows->offsets)) return false;
+    if (!read_required_integers(of, "connectivity", &rows->connectivity)) return false;
+    if (!read_optional_integers(of, "sizes", &rows->sizes) || !read_optional_integers(of, "offsets", &rows->offsets))
+        return false;
     if (rows->sizes.count < 0 && !rows->vertices) return node_set_error(of, "sizes", INSITU_ERROR_MESH, "is missing");
     rows->count = rows->sizes.count >= 0 ? rows->sizes.count : rows->connectivity.count / rows->vertices;
     if (rows->offsets.count >= 0 && rows->offsets.count != rows->count)
         return node_set_error(of, "offsets", INSITU_ERROR_MESH, "has %lld elements, expected %lld",
                               (long long)rows->offsets.count, (long long)rows->count);
-    if (rows->offsets.count < 0 && !make_offsets(of, rows, owned)) return false;
+    if (rows->offsets.count < 0 && !compute_row_offsets(of, rows, owned)) return false;
     return check_offsets(of, rows);
 }
 
@@ -124,7 +125,7 @@ static bool read_faces(const node *topology, blueprint_mesh *out)
     row_list rows = {.vertices = 0};
     if (!node_require(topology, "subelements", &faces) || !node_read_string(&faces, "shape", &name)) return false;
     const shape *of = find_shape(name);
-    if (!of && strcmp(name, "mixed") != 0) return fail_shape(&faces, "shape", name);
+    if (!of && strcmp(name, "mixed") != 0) return set_unknown_shape_error(&faces, "shape", name);
     if (of && of->type != INSITU_POLYGON && of->type != INSITU_TRIANGLE && of->type != INSITU_QUAD)
         return node_set_error(&faces, "shape", INSITU_ERROR_MESH, "is \"%s\", expected tri, quad, polygonal or mixed",
                               name);
@@ -154,7 +155,7 @@ static bool read_map(const node *elements, blueprint_mesh *out, bool *are_vtk)
         int64_t number = -1;
         node_get_child(&map, i, &entry);
         const shape *of = find_shape(entry.name);
-        if (!of) return fail_shape(&map, entry.name, entry.name);
+        if (!of) return set_unknown_shape_error(&map, entry.name, entry.name);
         if (!node_read_integer(&map, entry.name, true, &number)) return false;
         if (number < 0 || number >= MAP_SIZE)
             return node_set_error(&entry, "", INSITU_ERROR_MESH, "is %lld, expected 0..%d", (long long)number,
@@ -195,12 +196,12 @@ static void set_cell_rows(const row_list *rows, blueprint_mesh *out)
     out->mesh.connectivity_count = rows->connectivity.count;
 }
 
-static bool read_mixed(const node *topology, const node *elements, blueprint_mesh *out)
+static bool read_cells_of_several_types(const node *topology, const node *elements, blueprint_mesh *out)
 {
     node_array numbers;
     row_list rows = {.vertices = 0};
     bool are_vtk = false, has_polyhedra = false;
-    if (!require_integers(elements, "shapes", &numbers) || !read_map(elements, out, &are_vtk)) return false;
+    if (!read_required_integers(elements, "shapes", &numbers) || !read_map(elements, out, &are_vtk)) return false;
     if (!check_shape_numbers(elements, &numbers, out, &has_polyhedra)) return false;
     if (out->is_left_out) return true;
     if (!read_rows(elements, &rows, &out->owned)) return false;
@@ -216,15 +217,15 @@ static bool read_mixed(const node *topology, const node *elements, blueprint_mes
 
 /* ---- cells of one type ------------------------------------------------------------------------------------------ */
 
-static bool read_fixed(const node *elements, const shape *of, blueprint_mesh *out)
+static bool read_cells_of_one_type(const node *elements, const shape *of, blueprint_mesh *out)
 {
     row_list rows = {.vertices = of->vertices, .sizes = {.count = -1}};
-    if (!require_integers(elements, "connectivity", &rows.connectivity)) return false;
+    if (!read_required_integers(elements, "connectivity", &rows.connectivity)) return false;
     if (rows.connectivity.count % of->vertices != 0)
         return node_set_error(elements, "connectivity", INSITU_ERROR_MESH,
                               "has %lld elements, no multiple of a %s's %d", (long long)rows.connectivity.count,
                               of->name, of->vertices);
-    if (!find_integers(elements, "offsets", &rows.offsets)) return false;
+    if (!read_optional_integers(elements, "offsets", &rows.offsets)) return false;
     rows.count = rows.offsets.count >= 0 ? rows.offsets.count : rows.connectivity.count / of->vertices;
     if (rows.offsets.count >= 0 && !check_offsets(elements, &rows)) return false;
     rows.offsets = (node_array){.count = 0}; /* not needed: check_offsets() found them equal to the regular offsets */
@@ -245,16 +246,16 @@ bool blueprint_read_unstructured(const node *topology, blueprint_mesh *out)
         return true;
     }
     if (!node_read_string(&elements, "shape", &name)) return false;
-    if (strcmp(name, "mixed") == 0) return read_mixed(topology, &elements, out);
+    if (strcmp(name, "mixed") == 0) return read_cells_of_several_types(topology, &elements, out);
     const shape *of = find_shape(name);
-    if (!of) return fail_shape(&elements, "shape", name);
+    if (!of) return set_unknown_shape_error(&elements, "shape", name);
     if (of->type == SHAPE_POINT || of->type == SHAPE_LINE) {
         node_report_left_out(&elements, "shape", "is \"%s\": points and lines are not drawn", name);
         out->is_left_out = true;
         return true;
     }
     out->mesh.cell_type = (insitu_cell_type)of->type;
-    if (of->vertices) return read_fixed(&elements, of, out);
+    if (of->vertices) return read_cells_of_one_type(&elements, of, out);
     row_list rows = {.vertices = 0};
     if (!read_rows(&elements, &rows, &out->owned)) return false;
     set_cell_rows(&rows, out);

@@ -22,7 +22,7 @@ enum { VTK_HIDDEN_BITS = 1 | 8 | 32, VTK_LAYER_BITS = 1 | 32 };
 /* ---- fields of a topology --------------------------------------------------------------------------------------- */
 
 /* Checks whether state/metadata/vtk_fields declares the field as ghost flags. */
-static bool is_declared_ghosts(const node *domain, const char *name)
+static bool is_declared_ghost_field(const node *domain, const char *name)
 {
     node states, state;
     const char *attribute;
@@ -31,14 +31,15 @@ static bool is_declared_ghosts(const node *domain, const char *name)
            strcmp(attribute, "Ghosts") == 0;
 }
 
-static bool is_ghosts(const node *domain, const char *name)
+static bool is_ghost_field(const node *domain, const char *name)
 {
-    return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 || is_declared_ghosts(domain, name);
+    return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 ||
+           is_declared_ghost_field(domain, name);
 }
 
 /* Checks whether the field belongs to the topology. Fields of other topologies are ignored even if they contain
  * errors. */
-static bool belongs_to(const node *field, const char *topology)
+static bool belongs_to_topology(const node *field, const char *topology)
 {
     const char *name;
     if (!node_read_string(field, "topology", &name)) return false;
@@ -83,7 +84,7 @@ static bool next_field(field_walk *w)
     while (w->next < node_child_count(&w->fields)) {
         node_get_child(&w->fields, w->next++, &w->field);
         w->field_found = (blueprint_field){.first = 0};
-        if (belongs_to(&w->field, w->topology) && find_field(&w->field, &w->field_found, w->reports_left_out))
+        if (belongs_to_topology(&w->field, w->topology) && find_field(&w->field, &w->field_found, w->reports_left_out))
             return true;
         if (w->domain->log->status) return false;
     }
@@ -149,7 +150,7 @@ static void set_cell_strides(blueprint_mesh *mesh, const blueprint_field *field)
     if (!mesh->mesh.lattice || mesh->has_cell_strides) return;
     get_element_counts(mesh, true, counts);
     memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
-    mesh->mesh.cell_count = blueprint_element_span(counts, field->strides);
+    mesh->mesh.cell_count = blueprint_count_spanned_elements(counts, field->strides);
     mesh->has_cell_strides = true;
 }
 
@@ -224,7 +225,7 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
  * interior. In the second case, first excludes the ghost layers from the interior: these are the cells whose flags have
  * a bit of the mask. The block hides the coarser cells that its interior covers, and must not hide those that only its
  * ghost layers cover. */
-static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
+static int64_t combine_ghost_flags_of_block(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
 {
     insitu_lattice *l = &mesh->lattice;
     int64_t counts[3], first[3], end[3], any = 0;
@@ -246,11 +247,11 @@ static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
     node_array array;
     insitu_array flags;
     if (!node_read_array(&field->values_node, &array)) return false;
-    if (!node_is_integers(&array))
+    if (!node_is_integer_array(&array))
         return node_set_error(&field->values_node, "", INSITU_ERROR_FIELD,
                               "are no whole numbers, as flags of ghosts are");
     if (!read_component(&field->values_node, mesh, field, &flags)) return false;
-    const int64_t any = read_flag_bits(&flags, is_ascent ? -1 : VTK_LAYER_BITS, mesh);
+    const int64_t any = combine_ghost_flags_of_block(&flags, is_ascent ? -1 : VTK_LAYER_BITS, mesh);
     mesh->mesh.ghosts = any ? flags : (insitu_array){0};
     if (is_ascent || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
     unsigned char *own = make_flags(&field->field_node, mesh, &flags, VTK_HIDDEN_BITS);
@@ -280,7 +281,8 @@ static bool read_window(const node *window, const blueprint_mesh *mesh, int64_t 
     return true;
 }
 
-static void flag_cells(const int64_t strides[3], const int64_t first[3], const int64_t end[3], unsigned char *flags)
+static void set_flags_of_cell_range(const int64_t strides[3], const int64_t first[3], const int64_t end[3],
+                                    unsigned char *flags)
 {
     for (int64_t k = first[2]; k < end[2]; k++)
         for (int64_t j = first[1]; j < end[1]; j++)
@@ -310,7 +312,7 @@ static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
         }
         if (!flags) flags = make_flags(nestset, mesh, &mesh->mesh.ghosts, -1);
         if (!flags) return false;
-        flag_cells(mesh->lattice.cell_strides, first, end, flags);
+        set_flags_of_cell_range(mesh->lattice.cell_strides, first, end, flags);
     }
     if (!flags) return true;
     node_report_copy(nestset, "windows", mesh->mesh.cell_count, "flags of the cells that other domains refine");
@@ -325,7 +327,7 @@ static bool read_nestsets(const node *domain, const char *topology, blueprint_me
     if (!mesh->mesh.lattice || mesh->has_level || !node_find(domain, "nestsets", &nestsets)) return true;
     for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
         node_get_child(&nestsets, i, &nestset);
-        if (belongs_to(&nestset, topology) && !flag_covered_cells(&nestset, mesh)) return false;
+        if (belongs_to_topology(&nestset, topology) && !flag_covered_cells(&nestset, mesh)) return false;
         if (domain->log->status) return false;
     }
     return true;
@@ -337,7 +339,7 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
         if (!w.field_found.is_element) continue;
         if (!read_strides(mesh, &w.field_found)) return false;
         set_cell_strides(mesh, &w.field_found);
-        if (has_mesh_strides(mesh, &w.field_found) && is_ghosts(domain, w.field.name) &&
+        if (has_mesh_strides(mesh, &w.field_found) && is_ghost_field(domain, w.field.name) &&
             !set_ghost_flags(&w.field_found, mesh))
             return false;
         if (domain->log->status) return false;
@@ -394,7 +396,7 @@ static bool find_next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
 {
     while (next_field(w)) {
         blueprint_field *field = &w->field_found;
-        const bool is_flags = is_ghosts(w->domain, w->field.name);
+        const bool is_flags = is_ghost_field(w->domain, w->field.name);
         if (is_flags && !field->is_element && w->reports_left_out)
             node_report_left_out(&w->field, "values", "ghosts at vertices are not read");
         if (is_flags) continue;

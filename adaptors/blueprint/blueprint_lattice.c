@@ -12,7 +12,7 @@ static const double tolerance = 1e-6;
 /* Largest values that insitu_lattice allows for blocks with levels of refinement. */
 static const double largest_first = 1099511627776, largest_refinement = 1048576;
 
-uniform_block uniform_block_of(const blueprint_mesh *mesh)
+uniform_block describe_uniform_block(const blueprint_mesh *mesh)
 {
     const insitu_lattice *l = &mesh->lattice;
     uniform_block out = {.has_first = mesh->has_first, .has_level = mesh->has_level};
@@ -29,7 +29,7 @@ static bool is_same_spacing(double a, double b)
     return fabs(a - b) <= tolerance * a;
 }
 
-static void merge_axis(common_lattice *into, const common_lattice *from, int axis)
+static void merge_lattices_along_axis(common_lattice *into, const common_lattice *from, int axis)
 {
     if (from->coarsest[axis] == 0) return;
     const bool is_first = into->coarsest[axis] == 0;
@@ -46,7 +46,7 @@ static void merge_axis(common_lattice *into, const common_lattice *from, int axi
 
 static void merge(common_lattice *into, const common_lattice *from)
 {
-    for (int axis = 0; axis < 3; axis++) merge_axis(into, from, axis);
+    for (int axis = 0; axis < 3; axis++) merge_lattices_along_axis(into, from, axis);
 }
 
 static common_lattice make_lattice_of_block(const uniform_block *block)
@@ -119,7 +119,7 @@ static bool is_true_everywhere(MPI_Comm comm, bool condition)
     return !MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, comm) && all;
 }
 
-static bool gather_sizes(lattice_exchange *x, const named_lattices *own, int *total)
+static bool gather_lattice_counts(lattice_exchange *x, const named_lattices *own, int *total)
 {
     const int bytes = own->count * (int)sizeof *own->items;
     *total = 0;
@@ -134,7 +134,7 @@ static bool gather_sizes(lattice_exchange *x, const named_lattices *own, int *to
 
 /* Lists the meshes of `own` in *out, each with the common lattice of the blocks of all ranks. `all` contains the items
  * of all ranks, in the order of the ranks. */
-static void merge_all(const named_lattices *own, const named_lattice *all, int count, named_lattices *out)
+static void merge_lattices_of_ranks(const named_lattices *own, const named_lattice *all, int count, named_lattices *out)
 {
     for (int i = 0; i < own->count; i++) out->items[i] = (named_lattice){.mesh = own->items[i].mesh};
     out->count = own->count;
@@ -152,7 +152,7 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
     if (MPI_Comm_size(comm, &x.ranks)) return false;
     x.bytes = malloc((size_t)x.ranks * sizeof *x.bytes);
     x.starts = malloc((size_t)x.ranks * sizeof *x.starts);
-    bool is_done = gather_sizes(&x, own, &total);
+    bool is_done = gather_lattice_counts(&x, own, &total);
     if (is_done) {
         x.all = malloc((size_t)total + 1);
         out->items = malloc((size_t)own->count * sizeof *out->items + 1);
@@ -161,7 +161,7 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
                                   MPI_BYTE, comm);
     }
     if (is_done)
-        merge_all(own, x.all, total / (int)sizeof *x.all, out);
+        merge_lattices_of_ranks(own, x.all, total / (int)sizeof *x.all, out);
     else
         named_lattices_free(out);
     free(x.bytes);

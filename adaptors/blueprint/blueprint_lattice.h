@@ -31,7 +31,7 @@ typedef struct named_lattices {
 } named_lattices;
 
 /* Returns the mesh as a uniform block that has not been placed on a common lattice yet. */
-uniform_block uniform_block_of(const blueprint_mesh *mesh);
+uniform_block describe_uniform_block(const blueprint_mesh *mesh);
 
 /* Extends the mesh's common lattice by a block; adds the mesh if it is not in the list. Returns false if memory runs
  * out. */

@@ -25,7 +25,7 @@ void blueprint_mesh_free_tables(blueprint_mesh *mesh)
     mesh->type_map = NULL;
 }
 
-int64_t blueprint_element_span(const int64_t counts[3], const int64_t strides[3])
+int64_t blueprint_count_spanned_elements(const int64_t counts[3], const int64_t strides[3])
 {
     int64_t reach = 0;
     for (int axis = 0; axis < 3; axis++) reach += (counts[axis] > 0 ? counts[axis] - 1 : 0) * strides[axis];

@@ -61,6 +61,6 @@ bool blueprint_set_fields(const node *domain, const char *topology, const bluepr
 uint64_t blueprint_hash_fields(const node *domain, const char *topology, const blueprint_mesh *mesh);
 
 /* Returns the number of array elements from the first to the last cell or vertex, including padding. */
-int64_t blueprint_element_span(const int64_t counts[3], const int64_t strides[3]);
+int64_t blueprint_count_spanned_elements(const int64_t counts[3], const int64_t strides[3]);
 
 #endif

@@ -126,7 +126,7 @@ bool node_read_string(const node *parent, const char *path, const char **out)
 /* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
 /* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for all other ids, because they are not numeric. */
-static int find_type(int64_t id)
+static int convert_conduit_type(int64_t id)
 {
     static const unsigned char types[] = {0,
                                           0,
@@ -146,7 +146,7 @@ static int find_type(int64_t id)
 
 bool node_read_array(const node *of, node_array *out)
 {
-    const int type = find_type(of->conduit->id(of->conduit_node));
+    const int type = convert_conduit_type(of->conduit->id(of->conduit_node));
     if (!type) return node_set_error(of, "", INSITU_ERROR_MESH, "is no array of numbers");
     *out = (node_array){.count = of->conduit->number_of_elements(of->conduit_node)};
     out->array.type = (insitu_type)type;
@@ -210,7 +210,7 @@ int64_t node_get_element(const insitu_array *array, int64_t i)
     return 0;
 }
 
-bool node_is_integers(const node_array *array)
+bool node_is_integer_array(const node_array *array)
 {
     return array->array.type != INSITU_FLOAT32 && array->array.type != INSITU_FLOAT64;
 }
@@ -231,7 +231,7 @@ bool node_read_integer(const node *parent, const char *path, bool is_required, i
     node found;
     node_array number;
     if (!find_number(parent, path, is_required, &found, &number)) return !parent->log->status;
-    if (!node_is_integers(&number)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no whole number");
+    if (!node_is_integer_array(&number)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no whole number");
     *out = node_get_element(&number.array, 0);
     return true;
 }
@@ -258,7 +258,7 @@ bool node_read_integers(const node *parent, const char *path, int64_t out[3], in
     node found;
     node_array array;
     if (!node_find(parent, path, &found) || !node_read_array(&found, &array)) return false;
-    if (!node_is_integers(&array)) return node_set_error(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
+    if (!node_is_integer_array(&array)) return node_set_error(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
     if (array.count < 1 || array.count > 3)
         return node_set_error(&found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1 to 3",
                               (long long)array.count);

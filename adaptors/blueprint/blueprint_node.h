@@ -87,6 +87,6 @@ int64_t node_get_element(const insitu_array *array, int64_t i);
 /* Returns the size of the type in bytes. */
 int64_t node_type_bytes(insitu_type type);
 
-bool node_is_integers(const node_array *array);
+bool node_is_integer_array(const node_array *array);
 
 #endif

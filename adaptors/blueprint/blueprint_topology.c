@@ -30,14 +30,14 @@ static bool set_vertex_counts(const node *of, const char *path, const int64_t co
 
 /* Sets the strides of the lattice's vertices and cells to those of arrays without padding, and stores the numbers of
  * vertices and cells. */
-static void pack_lattice(blueprint_mesh *out)
+static void set_lattice_strides_and_counts(blueprint_mesh *out)
 {
     int64_t counts[3];
     for (int axis = 0; axis < 3; axis++) counts[axis] = out->lattice.cells[axis] + 1;
     node_read_strides(NULL, NULL, counts, out->lattice.vertex_strides);
     node_read_strides(NULL, NULL, out->lattice.cells, out->lattice.cell_strides);
-    out->mesh.vertex_count = blueprint_element_span(counts, out->lattice.vertex_strides);
-    out->mesh.cell_count = blueprint_element_span(out->lattice.cells, out->lattice.cell_strides);
+    out->mesh.vertex_count = blueprint_count_spanned_elements(counts, out->lattice.vertex_strides);
+    out->mesh.cell_count = blueprint_count_spanned_elements(out->lattice.cells, out->lattice.cell_strides);
 }
 
 /* Reads elements/origin, the index of the block's first vertex in the whole lattice. Its entries are called i0, j0 and
@@ -56,7 +56,7 @@ static bool read_first(const node *topology, int64_t first[3], bool *has_first)
 
 /* Reads a uniform coordset. The origin of the whole lattice is computed from elements/origin, so that all blocks
  * compute the same coordinates. */
-static bool read_uniform(const node *coordset, const node *topology, blueprint_mesh *out)
+static bool read_uniform_coordset(const node *coordset, const node *topology, blueprint_mesh *out)
 {
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
     static const char *const origins[3] = {"origin/x", "origin/y", "origin/z"};
@@ -75,13 +75,13 @@ static bool read_uniform(const node *coordset, const node *topology, blueprint_m
         out->lattice.first[axis] = first[axis];
     }
     if (!set_vertex_counts(coordset, "dims", counts, out)) return false;
-    pack_lattice(out);
+    set_lattice_strides_and_counts(out);
     return true;
 }
 
 /* Finds the coordinates along x, y and z. Returns false if one is missing. A coordset in another system (r, theta, phi)
  * is left out. */
-static bool find_axes(const node *coordset, node_array axes[3], int *count, blueprint_mesh *out)
+static bool find_coordinate_arrays(const node *coordset, node_array axes[3], int *count, blueprint_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
     static const char *const others[3] = {"values/r", "values/theta", "values/phi"};
@@ -100,26 +100,26 @@ static bool find_axes(const node *coordset, node_array axes[3], int *count, blue
     return true;
 }
 
-static bool read_rectilinear(const node *coordset, blueprint_mesh *out)
+static bool read_rectilinear_coordset(const node *coordset, blueprint_mesh *out)
 {
     node_array axes[3] = {{.count = 1}, {.count = 1}, {.count = 1}};
     int dimensions;
-    if (!find_axes(coordset, axes, &dimensions, out)) return false;
+    if (!find_coordinate_arrays(coordset, axes, &dimensions, out)) return false;
     if (out->is_left_out) return true;
     const int64_t counts[3] = {axes[0].count, axes[1].count, axes[2].count};
     if (!set_vertex_counts(coordset, "values", counts, out)) return false;
     for (int axis = 0; axis < dimensions; axis++) out->lattice.axes[axis] = axes[axis].array;
-    pack_lattice(out);
+    set_lattice_strides_and_counts(out);
     return true;
 }
 
 /* Reads the coordinates of each vertex. In two dimensions there is no z. */
-static bool read_explicit(const node *coordset, blueprint_mesh *out)
+static bool read_explicit_coordset(const node *coordset, blueprint_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
     node_array axes[3];
     int dimensions;
-    if (!find_axes(coordset, axes, &dimensions, out)) return false;
+    if (!find_coordinate_arrays(coordset, axes, &dimensions, out)) return false;
     if (out->is_left_out) return true;
     if (dimensions == 1) {
         node_report_left_out(coordset, "values", "coordinates of one dimension");
@@ -161,19 +161,19 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
     return !topology->log->status;
 }
 
-static bool read_structured(const node *topology, blueprint_mesh *out)
+static bool read_structured_topology(const node *topology, blueprint_mesh *out)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0}, strides[3], first = 0;
     insitu_mesh *m = &out->mesh;
     if (!read_dims(topology, counts, offsets, strides)) return false;
     if (!set_vertex_counts(topology, "elements/dims", counts, out)) return false;
     for (int axis = 0; axis < 3; axis++) first += offsets[axis] * strides[axis];
-    const int64_t span = blueprint_element_span(counts, strides);
+    const int64_t span = blueprint_count_spanned_elements(counts, strides);
     if (first + span > m->vertex_count)
         return node_set_error(topology, "elements/dims", INSITU_ERROR_MESH,
                               "reaches vertex %lld, the coordset has %lld", (long long)(first + span - 1),
                               (long long)m->vertex_count);
-    pack_lattice(out);
+    set_lattice_strides_and_counts(out);
     memcpy(out->lattice.vertex_strides, strides, sizeof strides);
     m->vertex_count = span;
     for (int axis = 0; axis < 3; axis++)
@@ -187,9 +187,9 @@ static bool read_structured(const node *topology, blueprint_mesh *out)
 
 static bool read_coordset(const node *coordset, const node *topology, const char *type, blueprint_mesh *out)
 {
-    if (strcmp(type, "uniform") == 0) return read_uniform(coordset, topology, out);
-    if (strcmp(type, "rectilinear") == 0) return read_rectilinear(coordset, out);
-    if (strcmp(type, "explicit") == 0) return read_explicit(coordset, out);
+    if (strcmp(type, "uniform") == 0) return read_uniform_coordset(coordset, topology, out);
+    if (strcmp(type, "rectilinear") == 0) return read_rectilinear_coordset(coordset, out);
+    if (strcmp(type, "explicit") == 0) return read_explicit_coordset(coordset, out);
     return node_set_error(coordset, "type", INSITU_ERROR_MESH, "is \"%s\", expected uniform, rectilinear or explicit",
                           type);
 }
@@ -237,6 +237,6 @@ bool blueprint_read_topology(const node *domain, const node *topology, blueprint
     if (out->is_left_out) return true;
     out->has_level =
         strcmp(type, "uniform") == 0 && (node_has(domain, "state/level") || node_has(domain, "state/level_id"));
-    if (strcmp(type, "structured") == 0) return read_structured(topology, out);
+    if (strcmp(type, "structured") == 0) return read_structured_topology(topology, out);
     return strcmp(type, "unstructured") != 0 || blueprint_read_unstructured(topology, out);
 }

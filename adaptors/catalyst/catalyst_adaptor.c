@@ -92,7 +92,7 @@ static bool find_scene(const node *root, const char **scene, bool *is_text)
 
 /* Reads catalyst/insitu/parameters: the names of the scene's parameters whose values the simulation requests, each with
  * the value to return if the scene lacks the parameter. */
-static bool find_parameters(const node *root)
+static bool read_requested_parameters(const node *root)
 {
     node all, one;
     state.parameter_count = 0;
@@ -134,7 +134,7 @@ insitu_status catalyst_adaptor_initialize(const insitu_conduit *conduit, const v
     bool is_text = false;
     if (state.session) return fail(INSITU_ERROR_ARGUMENT, "catalyst_initialize() is called for a second time");
     state = (struct catalyst_state){.conduit = conduit};
-    if (find_communicator(&root, &comm) && find_parameters(&root)) find_scene(&root, &scene, &is_text);
+    if (find_communicator(&root, &comm) && read_requested_parameters(&root)) find_scene(&root, &scene, &is_text);
     MPI_Comm_rank(comm, &state.rank);
     insitu_status status = agree_on_error(comm, &log);
     if (!status) status = open_session(comm, scene, is_text);
@@ -224,7 +224,7 @@ insitu_status catalyst_adaptor_finalize(void)
     return status;
 }
 
-void catalyst_adaptor_results(const catalyst_writer *writer, void *node)
+void catalyst_adaptor_write_results(const catalyst_writer *writer, void *node)
 {
     char path[NODE_NAME + 32];
     writer->set_string(node, "insitu/status", insitu_status_name(state.status));
@@ -244,7 +244,7 @@ void catalyst_adaptor_results(const catalyst_writer *writer, void *node)
     }
 }
 
-void catalyst_adaptor_about(const catalyst_writer *writer, void *node)
+void catalyst_adaptor_write_about(const catalyst_writer *writer, void *node)
 {
     writer->set_string(node, "catalyst/implementation", "insitu");
     writer->set_string(node, "catalyst/tpl/libinsitu/license", "Apache-2.0");

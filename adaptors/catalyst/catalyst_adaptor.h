@@ -24,8 +24,8 @@ insitu_status catalyst_adaptor_finalize(void);
 
 /* Writes the report of the last step, and the values of the parameters that the node of catalyst_initialize()
  * requested. Local. */
-void catalyst_adaptor_results(const catalyst_writer *writer, void *node);
+void catalyst_adaptor_write_results(const catalyst_writer *writer, void *node);
 
-void catalyst_adaptor_about(const catalyst_writer *writer, void *node);
+void catalyst_adaptor_write_about(const catalyst_writer *writer, void *node);
 
 #endif

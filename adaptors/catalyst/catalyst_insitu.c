@@ -45,12 +45,12 @@ enum catalyst_status catalyst_finalize_insitu(const conduit_node *params)
 
 enum catalyst_status catalyst_about_insitu(conduit_node *params)
 {
-    catalyst_adaptor_about(&writer, params);
+    catalyst_adaptor_write_about(&writer, params);
     return catalyst_status_ok;
 }
 
 enum catalyst_status catalyst_results_insitu(conduit_node *params)
 {
-    catalyst_adaptor_results(&writer, params);
+    catalyst_adaptor_write_results(&writer, params);
     return catalyst_status_ok;
 }

@@ -207,7 +207,7 @@ void draw_bar(drawing &s, const block &b)
     draw_frame(s, b.gradient);
     draw_out_of_range_boxes(s, bar, b);
     for (const int i : b.ticks) {
-        const double y = tick_row(bar.ticks[i], b.gradient);
+        const double y = compute_tick_y(bar.ticks[i], b.gradient);
         draw_stroke_with_halo(s, {{b.gradient.x1, y}, {b.gradient.x1 + 0.3 * b.size, y}, false}, line_width(s), b.size,
                               s.decorations.colour);
     }
@@ -297,7 +297,7 @@ void decorate(const insitu_image &image, std::vector<float> &rgba)
     for (const block &b : place_blocks(image, s.font).blocks) draw_block(s, b);
 }
 
-void check_text(const insitu_image &image, insitu_word_faults &out)
+void find_text_faults(const insitu_image &image, insitu_word_faults &out)
 {
     const auto store_message = [](char(&text)[1024], const std::string &words) {
         std::snprintf(text, sizeof text, "%s", words.c_str());

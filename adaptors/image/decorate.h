@@ -11,6 +11,6 @@
 void decorate(const insitu_image &image, std::vector<float> &rgba);
 
 /* Reports text that decorate() leaves out or draws differently: missing fonts, missing glyphs, or lack of space. */
-void check_text(const insitu_image &image, insitu_word_faults &out);
+void find_text_faults(const insitu_image &image, insitu_word_faults &out);
 
 #endif

@@ -124,7 +124,7 @@ void encode(int width, int height, const insitu_deep &deep, const std::string &p
 }
 
 /* Returns the largest number of bytes that OpenImageIO needs to store and compress a band. */
-std::size_t largest_band_bytes(int width, int height, const insitu_deep &deep)
+std::size_t compute_largest_band_size(int width, int height, const insitu_deep &deep)
 {
     std::size_t most = 0;
     for (int y = 0; y < height; y += BAND_ROWS) {
@@ -142,7 +142,7 @@ void write_deep_exr(int width, int height, const insitu_deep &deep, const std::s
     enum { TABLES = 16 << 20, ROW_TABLES = 256 };
     memory_file file;
     const memory_reserve reserve(TABLES + static_cast<std::size_t>(height) * ROW_TABLES +
-                                 largest_band_bytes(width, height, deep));
+                                 compute_largest_band_size(width, height, deep));
     encode(width, height, deep, file.path());
     const unsigned char *const bytes = file.bytes();
     check_exr_rows(bytes, file.size(), height, EXR_ZIPS_ROWS);

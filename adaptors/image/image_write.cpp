@@ -270,7 +270,7 @@ extern "C" insitu_status insitu_image_check_words(const insitu_image *image, ins
 {
     if (!image || !out || !image->decorations || image->width < 1 || image->height < 1) return INSITU_ERROR_ARGUMENT;
     try {
-        check_text(*image, *out);
+        find_text_faults(*image, *out);
         return INSITU_OK;
     } catch (...) {
         *out = {};

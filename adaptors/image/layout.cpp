@@ -155,7 +155,7 @@ std::vector<std::string> wrap_text(const layout_state &s, const std::string &tex
     return lines;
 }
 
-double measure_lines(const layout_state &s, const std::vector<std::string> &lines, int size)
+double measure_widest_line(const layout_state &s, const std::vector<std::string> &lines, int size)
 {
     int width = 0;
     for (const std::string &line : lines) width = std::max(width, s.measure(line, size));
@@ -196,7 +196,7 @@ bool place_words(layout_state &s, int index)
             if (!is_last && (lines.size() > MOST_LINES || !is_wrapped_at_blanks(words.text, lines))) continue;
             block b{block_kind::words, index, size, {}, {}, {}, {}};
             const double height = std::ceil(static_cast<double>(lines.size()) * line_height * size) + pads;
-            if (!find_free_bounds(s, words.at, measure_lines(s, lines, size) + pads, height, b.bounds)) continue;
+            if (!find_free_bounds(s, words.at, measure_widest_line(s, lines, size) + pads, height, b.bounds)) continue;
             align_lines(s, lines, words.at, b);
             s.out.blocks.push_back(b);
             return true;
@@ -230,7 +230,7 @@ bar_group make_group(const layout_state &s, const std::vector<int> &bars, insitu
         g.labels.push_back(wrap_text(s, bar.label, size, most));
         g.is_readable = g.is_readable && g.labels.back().size() <= MOST_LABEL_LINES &&
                         is_wrapped_at_blanks(bar.label, g.labels.back());
-        g.width = std::max({g.width, body, measure_lines(s, g.labels.back(), size)});
+        g.width = std::max({g.width, body, measure_widest_line(s, g.labels.back(), size)});
         lines = std::max(lines, g.labels.back().size());
     }
     g.width = std::ceil(g.width) + 2 * pixels(padding, size);
@@ -277,8 +277,8 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     b.gradient = {left, bounds.y0 + g.head, left + thickness * g.size, bounds.y1 - edge};
     b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);
     for (const int i : b.ticks)
-        b.lines.push_back(
-            {bar.ticks[i].text, b.gradient.x1 + 0.5 * g.size, tick_row(bar.ticks[i], b.gradient) + 0.36 * g.size});
+        b.lines.push_back({bar.ticks[i].text, b.gradient.x1 + 0.5 * g.size,
+                           compute_tick_y(bar.ticks[i], b.gradient) + 0.36 * g.size});
     return b;
 }
 
@@ -355,7 +355,7 @@ bool place_group(layout_state &s, const bar_group &g, double edge)
     return false;
 }
 
-bool place_at_largest_size(layout_state &s, const std::vector<int> &bars, insitu_anchor at)
+bool place_bars_at_largest_size(layout_state &s, const std::vector<int> &bars, insitu_anchor at)
 {
     const std::vector<int> sizes = list_text_sizes(s.size);
     for (const int size : sizes) {
@@ -388,7 +388,7 @@ void place_bars(layout_state &s, insitu_anchor at)
     std::vector<int> bars;
     for (int i = 0; i < s.decorations.bar_count; i++)
         if ((s.decorations.bars[i].at == INSITU_LEFT) == (at == INSITU_LEFT)) bars.push_back(i);
-    while (!bars.empty() && !place_at_largest_size(s, bars, at)) {
+    while (!bars.empty() && !place_bars_at_largest_size(s, bars, at)) {
         s.out.left_out.push_back(quote_decoration_name("the colour bar", s.decorations.bars[bars.back()].label));
         bars.pop_back();
     }
@@ -398,7 +398,7 @@ void place_bars(layout_state &s, insitu_anchor at)
 
 /* Adds a block for each area that another picture covers, with a gap around it, so that no decoration touches the frame
  * of that picture. */
-void place_covered(layout_state &s)
+void place_covered_areas(layout_state &s)
 {
     const double gap = pixels(padding, s.size);
     for (int i = 0; i < s.decorations.covered_count; i++) {
@@ -465,22 +465,22 @@ void place_all_words(layout_state &s, bool at_sides)
 
 } // namespace
 
-int text_size(const insitu_image &image)
+int compute_text_height(const insitu_image &image)
 {
     return std::max(1, static_cast<int>(std::lround(image.decorations->size * image.height)));
 }
 
-double tick_row(const insitu_tick &tick, const area &gradient)
+double compute_tick_y(const insitu_tick &tick, const area &gradient)
 {
     return gradient.y1 - tick.place * (gradient.y1 - gradient.y0);
 }
 
 layout make_layout(const insitu_image &image, const text_measure &measure)
 {
-    const int size = text_size(image);
+    const int size = compute_text_height(image);
     const double edge = pixels(border, size);
     layout_state s{image, *image.decorations, measure, size, edge, edge, image.width - edge, image.height - edge, {}};
-    place_covered(s);
+    place_covered_areas(s);
     place_all_words(s, false);
     place_bars(s, INSITU_RIGHT);
     place_bars(s, INSITU_LEFT);

@@ -49,9 +49,9 @@ using text_measure = std::function<int(const std::string &text, int size)>;
 layout make_layout(const insitu_image &image, const text_measure &measure);
 
 /* Returns the height of the text in pixels. */
-int text_size(const insitu_image &image);
+int compute_text_height(const insitu_image &image);
 
 /* Returns the y coordinate of a bar's tick. */
-double tick_row(const insitu_tick &tick, const area &gradient);
+double compute_tick_y(const insitu_tick &tick, const area &gradient);
 
 #endif

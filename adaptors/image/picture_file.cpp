@@ -181,7 +181,7 @@ int open_folder(const std::filesystem::path &folder)
 
 /* Throws unless the name is free, a regular file or a link, because renaming would replace a pipe or a device by the
  * picture. */
-void check_target(int folder, const std::string &name)
+void check_rename_target(int folder, const std::string &name)
 {
     struct stat found;
     if (name.empty()) fail("", EISDIR);
@@ -210,7 +210,7 @@ void write_picture_file(const std::string &path, const unsigned char *bytes, std
     const std::filesystem::path target(path);
     const std::string name = target.filename().string();
     const descriptor folder(open_folder(target.parent_path()));
-    check_target(folder.number(), name);
+    check_rename_target(folder.number(), name);
     remove_stale_files_once(folder.number());
     /* Largest number of attempts to write a picture. Another process may remove the temporary file because it treats
      * the file as one of a killed run: before the file is locked, or if locks do not work across nodes. */

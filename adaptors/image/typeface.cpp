@@ -126,7 +126,7 @@ std::string known_fonts()
 
 /* Decodes the character that begins at byte `at`, and advances `at` to the first byte after it. Returns the replacement
  * character for invalid UTF-8. */
-char32_t next_character(const std::string &text, std::size_t &at)
+char32_t decode_next_character(const std::string &text, std::size_t &at)
 {
     static const char32_t least[] = {0, 0x80, 0x800, 0x10000};
     const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
@@ -220,7 +220,7 @@ std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad)
     out.reserve(text.size());
     for (std::size_t at = 0; at < text.size();) {
         const std::size_t begin = at;
-        out.push_back(next_character(text, at));
+        out.push_back(decode_next_character(text, at));
         is_bad = is_bad || (out.back() == replacement && at == begin + 1);
     }
     return out;
@@ -257,14 +257,14 @@ int typeface::width_of(const std::string &text, int size) const
     if (!face_ || !set_size(face_, size)) return 0;
     for (const char32_t character : decode_utf8(text, is_bad)) {
         const FT_UInt glyph = find_glyph(face_, character);
-        x += get_kerning(face_, before, glyph) + advance_of(glyph, size);
+        x += get_kerning(face_, before, glyph) + compute_glyph_advance(glyph, size);
         before = glyph;
     }
     return x;
 }
 
 /* Returns the advance of a glyph in pixels. The size must be set already. */
-int typeface::advance_of(unsigned glyph, int size) const
+int typeface::compute_glyph_advance(unsigned glyph, int size) const
 {
     const auto known = advances_.find({size, glyph});
     if (known != advances_.end()) return known->second;

@@ -41,7 +41,7 @@ class typeface
     std::string font_fault() const;
 
   private:
-    int advance_of(unsigned glyph, int size) const;
+    int compute_glyph_advance(unsigned glyph, int size) const;
 
     FT_LibraryRec_ *library_ = nullptr;
     FT_FaceRec_ *face_ = nullptr;

@@ -276,7 +276,7 @@ void set_leaf(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
 }
 
 /* Reports the bytes of the lists that insitu_vtk_make_grid() allocated for data. */
-void log_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, conversion_log &log)
+void log_bytes_of_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, conversion_log &log)
 {
     if (grid->GetNumberOfCells() == 0) return;
     const std::string of = std::string(" of a ") + data->GetClassName();
@@ -298,11 +298,11 @@ void log_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::stri
 
 /* Converts a data set that is neither structured nor an unstructured grid to an unstructured grid, and sets this on the
  * session. */
-void set_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data,
-                   set_result &out)
+void set_converted_grid(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data,
+                        set_result &out)
 {
     const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(data));
-    log_made_lists(grid, data, "mesh '" + name + "'", out.log);
+    log_bytes_of_made_lists(grid, data, "mesh '" + name + "'", out.log);
     set_leaf(adaptor, parts, name, grid, out);
 }
 
@@ -373,19 +373,20 @@ void set_leaves(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string 
         else if (!leaf_data)
             out.log.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
         else if (!set_block(adaptor, parts, name, number, composite, leaf_data, out))
-            set_converted(adaptor, parts, leaf_name, leaf_data, out);
+            set_converted_grid(adaptor, parts, leaf_name, leaf_data, out);
     }
 }
 
 /* Sets a data set that is not an unstructured grid on the session: as a lattice if it is structured, and otherwise as
  * an unstructured grid. */
-void set_other(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data, set_result &out)
+void set_structured_or_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name,
+                                 vtkDataSet *data, set_result &out)
 {
     mesh_part new_part;
     if (make_lattice_part(data, name, out, new_part))
         set_part(adaptor, parts, {name, whole_mesh}, std::move(new_part), out);
     else
-        set_converted(adaptor, parts, name, data, out);
+        set_converted_grid(adaptor, parts, name, data, out);
 }
 
 void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataObject *data,
@@ -397,7 +398,7 @@ void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
     else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
         set_leaves(adaptor, parts, name, composite, out);
     else if (auto *other = vtkDataSet::SafeDownCast(data))
-        set_other(adaptor, parts, name, other, out);
+        set_structured_or_converted(adaptor, parts, name, other, out);
     else
         throw failure{INSITU_ERROR_ARGUMENT, "mesh '" + name + "': a " + data->GetClassName() +
                                                  " is not taken, expected a vtkDataSet or a composite of them"};

@@ -100,7 +100,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, held_arr
 }
 
 /* Copies an array of any class element by element. Each element is read by GetComponent(), which returns a double. */
-template <typename To> array_view convert_any(vtkDataArray *array, held_arrays &held)
+template <typename To> array_view copy_elements_one_by_one(vtkDataArray *array, held_arrays &held)
 {
     array_view view = describe_array(array, element_type<To>());
     const size_t count = static_cast<size_t>(view.tuple_count) * static_cast<size_t>(view.component_count);
@@ -118,8 +118,8 @@ array_view copy_array(vtkDataArray *array, held_arrays &held)
         convert<unsigned char, int32_t>(array, held, view) || convert<short, int32_t>(array, held, view) ||
         convert<unsigned short, int32_t>(array, held, view) || convert<unsigned int, int64_t>(array, held, view))
         return view;
-    if (array->GetDataType() == VTK_FLOAT) return convert_any<float>(array, held);
-    return convert_any<double>(array, held);
+    if (array->GetDataType() == VTK_FLOAT) return copy_elements_one_by_one<float>(array, held);
+    return copy_elements_one_by_one<double>(array, held);
 }
 
 int64_t count_bytes(const array_view &view)
@@ -128,7 +128,7 @@ int64_t count_bytes(const array_view &view)
 }
 
 /* Checks whether libinsitu supports the type of the elements, so that only the layout prevents borrowing. */
-bool is_known_type(vtkDataArray *array)
+bool is_supported_element_type(vtkDataArray *array)
 {
     const int type = array->GetDataType();
     return type == VTK_FLOAT || type == VTK_DOUBLE || type == VTK_INT || type == VTK_LONG || type == VTK_LONG_LONG ||
@@ -148,7 +148,7 @@ const char *type_name(insitu_type type)
 
 std::string find_copy_reason(vtkDataArray *array, const array_view &copy)
 {
-    if (is_known_type(array)) return "components not laid out evenly";
+    if (is_supported_element_type(array)) return "components not laid out evenly";
     return std::string(array->GetDataTypeAsString()) + " values to " + type_name(copy.type);
 }
 
@@ -246,7 +246,7 @@ void view_points(vtkDataArray *points, const std::string &what, held_arrays &hel
         held.objects.emplace_back(points);
         log.bytes_borrowed += count_bytes(view);
     } else {
-        view = convert_any<double>(points, held);
+        view = copy_elements_one_by_one<double>(points, held);
         log.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", count_bytes(view));
     }
     for (int c = 0; c < 3; c++) coordinates[c] = view.component(c);

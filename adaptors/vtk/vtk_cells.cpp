@@ -127,7 +127,7 @@ conversion_table make_higher_conversions()
     return table;
 }
 
-const cell_conversion &higher_conversion(uint8_t type)
+const cell_conversion &get_higher_order_conversion(uint8_t type)
 {
     static const conversion_table table = make_higher_conversions();
     return table[type];
@@ -157,7 +157,7 @@ template <typename Id> struct raw_cells {
 
     const cell_conversion &conversion_of(int64_t cell) const
     {
-        const cell_conversion &higher = higher_conversion(types[cell]);
+        const cell_conversion &higher = get_higher_order_conversion(types[cell]);
         const bool is_lagrange = types[cell] >= VTK_LAGRANGE_TRIANGLE && types[cell] <= VTK_LAGRANGE_PYRAMID;
         if (higher.kind != conversion_kind::higher || !are_higher_known || size(cell) < higher.needed_points ||
             (is_lagrange && !is_complete(types[cell], size(cell))))

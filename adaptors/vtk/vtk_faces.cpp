@@ -37,7 +37,7 @@ int64_t face_list::face(const int64_t *points, size_t count)
 
 /* Reads the face stream of a cell: the number of faces, and for each face its number of points and its points. Returns
  * false if the stream is not valid. */
-bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
+bool face_list::add_faces_of_stream(vtkUnstructuredGrid *grid, int64_t cell)
 {
     vtkIdTypeArray *stream = grid->GetFaces(), *places = grid->GetFaceLocations();
     if (!stream || !places || cell >= places->GetNumberOfValues()) return false;
@@ -57,7 +57,7 @@ bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
 }
 
 /* Adds the faces of a prism. Its points go around one base, then around the other. */
-void face_list::add_prism(const int64_t *points, int sides)
+void face_list::add_faces_of_prism(const int64_t *points, int sides)
 {
     cells.push_back(face(points, static_cast<size_t>(sides)));
     cells.push_back(face(points + sides, static_cast<size_t>(sides)));
@@ -73,9 +73,9 @@ bool face_list::add_cell(vtkUnstructuredGrid *grid, int64_t cell, int type, cons
     const size_t before = cells.size();
     bool is_whole = true;
     if (type == VTK_POLYHEDRON)
-        is_whole = add_stream(grid, cell);
+        is_whole = add_faces_of_stream(grid, cell);
     else
-        add_prism(points, type == VTK_PENTAGONAL_PRISM ? 5 : 6);
+        add_faces_of_prism(points, type == VTK_PENTAGONAL_PRISM ? 5 : 6);
     if (is_whole)
         cell_starts.push_back(static_cast<int64_t>(cells.size()));
     else

@@ -31,8 +31,8 @@ class face_list
 
   private:
     int64_t face(const int64_t *points, size_t count);
-    bool add_stream(vtkUnstructuredGrid *grid, int64_t cell);
-    void add_prism(const int64_t *points, int sides);
+    bool add_faces_of_stream(vtkUnstructuredGrid *grid, int64_t cell);
+    void add_faces_of_prism(const int64_t *points, int sides);
 
     /* starts: for each face, the index of its first point in face_points, and a final entry, the total; face_points:
      * the points of all faces, in order around each face; sorted: the same points, sorted within each face */

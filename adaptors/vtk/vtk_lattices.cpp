@@ -22,7 +22,7 @@ namespace
 
 /* Sets origin, spacing and first index of an image. The coordinate along an axis is spacing * i + origin, with i
  * counted in the whole extent. Returns false if the axes are rotated or a spacing is 0. */
-bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
+bool set_uniform_coordinates(vtkImageData *image, insitu_lattice &lattice)
 {
     if (!image || !image->GetDirectionMatrix()->IsIdentity()) return false;
     const double *origin = image->GetOrigin(), *spacing = image->GetSpacing();
@@ -37,8 +37,8 @@ bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
     return true;
 }
 
-bool set_axes(vtkRectilinearGrid *grid, const std::string &what, held_arrays &held, conversion_log &log,
-              insitu_lattice &lattice)
+bool set_rectilinear_axes(vtkRectilinearGrid *grid, const std::string &what, held_arrays &held, conversion_log &log,
+                          insitu_lattice &lattice)
 {
     if (!grid) return false;
     vtkDataArray *axes[3] = {grid->GetXCoordinates(), grid->GetYCoordinates(), grid->GetZCoordinates()};
@@ -98,8 +98,8 @@ bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, 
     auto *set = vtkPointSet::SafeDownCast(data);
     if (set && set->GetPoints())
         view_points(set->GetPoints()->GetData(), what + " points", held, log, mesh.coordinates);
-    else if (!set && !set_uniform(vtkImageData::SafeDownCast(data), lattice) &&
-             !set_axes(vtkRectilinearGrid::SafeDownCast(data), what, held, log, lattice))
+    else if (!set && !set_uniform_coordinates(vtkImageData::SafeDownCast(data), lattice) &&
+             !set_rectilinear_axes(vtkRectilinearGrid::SafeDownCast(data), what, held, log, lattice))
         list_points(data, what, held, log, mesh);
     return true;
 }

@@ -37,7 +37,7 @@ size_t comp_sheet_max_bytes(int pixels, int words)
            (size_t)words * (sizeof(uint32_t) * (size_t)(pixels + 1) + COMP_ROWS / 2) + COMP_SHEET_SLACK;
 }
 
-int comp_sheet_count(const comp_sheet *sheet)
+int comp_sheet_count_pixels(const comp_sheet *sheet)
 {
     uint64_t masks[COMP_ROWS / 4];
     int count = 0;
@@ -140,6 +140,6 @@ void comp_sheet_finish(const comp_sheet *fragments, const float background[4], c
 
 void comp_sheet_store(const comp_sheet *pixels, const comp_grid *grid, const float background[4], image *out)
 {
-    const comp_area area = comp_grid_area(grid, pixels->strip);
+    const comp_area area = comp_find_strip_area(grid, pixels->strip);
     comp_sheet_loops_of(cpu_best_isa())->store(pixels, &area, background, out);
 }

@@ -92,7 +92,7 @@ typedef struct comp_sheet_head {
  * including scratch bytes after the end of the packed data. */
 size_t comp_sheet_max_bytes(int pixels, int words);
 
-int comp_sheet_count(const comp_sheet *sheet);
+int comp_sheet_count_pixels(const comp_sheet *sheet);
 
 /* Packs the first `words` words of a sheet; returns the end of the packed data. All functions in this file are
  * local. */

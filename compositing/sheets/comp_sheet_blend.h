@@ -103,7 +103,7 @@ ROWS_INLINE void store_quad(float *to, quad value, bool is_aligned)
 
 /* Transposes four pixels from one vector per channel to RGBA, and stores them. If is_aligned is set, the stores bypass
  * the caches, because the picture is larger than the caches. */
-ROWS_INLINE void store_four(const quad in[4], float *rgba, bool is_aligned)
+ROWS_INLINE void store_four_pixels(const quad in[4], float *rgba, bool is_aligned)
 {
     const quad a = __builtin_shufflevector(in[0], in[1], 0, 4, 1, 5),
                b = __builtin_shufflevector(in[0], in[1], 2, 6, 3, 7);
@@ -121,7 +121,7 @@ ROWS_INLINE void store_row(const lanes values[5], const picture_row *to)
     memcpy(parts, values, sizeof parts);
     for (int q = 0; q < 4; q++) {
         const quad channels[4] = {parts[1][q], parts[2][q], parts[3][q], parts[4][q]};
-        store_four(channels, to->rgba + 16 * q, to->is_aligned);
+        store_four_pixels(channels, to->rgba + 16 * q, to->is_aligned);
         if (to->depth) store_quad(to->depth + 4 * q, parts[0][q], to->is_aligned);
     }
 }

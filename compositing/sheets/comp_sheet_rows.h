@@ -20,7 +20,7 @@ static uint8_t find_nearest_lane(unsigned known, int lane)
 
 /* Sets plan->fresh, for each row, to the lanes that have a pixel in this row but none in the rows above, and
  * plan->source to the lanes from whose values those of the fresh lanes are predicted. */
-static void find_fresh_lanes(sheet_plan *plan)
+static void find_lanes_without_predecessor(sheet_plan *plan)
 {
     unsigned known = plan->mask[0];
     plan->fresh[0] = 0;
@@ -46,7 +46,7 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
         plan->rows += masks[r] != 0;
     }
     plan->is_sparse = 2 * plan->count < plan->rows * COMP_LANES;
-    if (plan->rows && !plan->is_sparse) find_fresh_lanes(plan);
+    if (plan->rows && !plan->is_sparse) find_lanes_without_predecessor(plan);
 }
 
 /* The state of the prediction for each lane. last: the value of the nearest row above that has a pixel in the lane;
@@ -55,7 +55,7 @@ typedef struct prediction {
     lanes last, slope;
 } prediction;
 
-ROWS_INLINE void predict_fresh_lanes(const sheet_plan *plan, int i, prediction *f)
+ROWS_INLINE void predict_lanes_without_predecessor(const sheet_plan *plan, int i, prediction *f)
 {
     for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
         const int lane = __builtin_ctz(left);
@@ -253,7 +253,7 @@ ROWS_INLINE lanes compute_first_row_residuals(lanes values, unsigned mask)
 }
 
 /* Computes the residuals of both predictions; returns the one that takes fewer bytes. */
-ROWS_INLINE enum word_kind predict_word(const uint32_t *words, const sheet_plan *plan, word_residuals *out)
+ROWS_INLINE enum word_kind choose_word_prediction(const uint32_t *words, const sheet_plan *plan, word_residuals *out)
 {
     prediction f;
     size_t bytes[2] = {0, 0};
@@ -262,7 +262,7 @@ ROWS_INLINE enum word_kind predict_word(const uint32_t *words, const sheet_plan 
         const unsigned mask = plan->mask[i];
         lanes above, line;
         if (i) {
-            if (plan->fresh[i]) predict_fresh_lanes(plan, i, &f);
+            if (plan->fresh[i]) predict_lanes_without_predecessor(plan, i, &f);
             above = zigzag_encode(values - f.last);
             line = zigzag_encode(values - f.last - f.slope);
             if (mask != 0xffff) above = compress_lanes(above, mask);
@@ -286,7 +286,7 @@ ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *p
                                       unsigned char *out)
 {
     word_residuals residuals;
-    *kind = predict_word(words, plan, &residuals);
+    *kind = choose_word_prediction(words, plan, &residuals);
     const uint8_t *nibbles = residuals.nibbles[*kind];
     for (int i = 0; i < plan->rows; i += 2)
         *out++ = (unsigned char)(nibbles[i] | (i + 1 < plan->rows ? nibbles[i + 1] : 0) << 4);
@@ -298,7 +298,7 @@ ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *p
 /* Returns how a word is stored. The result is WORD_UNIFORM if all pixels have the first pixel's value, and
  * WORD_REPEATED if the word equals the preceding word in all pixels. Otherwise it is WORD_LINEAR, although the caller
  * may then choose WORD_CONSTANT instead, if it takes fewer bytes. */
-ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
+ROWS_INLINE enum word_kind choose_word_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
 {
     const uint32_t *own = sheet->words[word], *before = sheet->words[word ? word - 1 : 0];
     lanes others = {0}, next = {0};
@@ -317,7 +317,7 @@ static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *pla
     const int first = plan->row[0] * COMP_LANES + __builtin_ctz(plan->mask[0]);
     *kinds = 0;
     for (int w = 0; w < words; w++) {
-        enum word_kind kind = find_kind(sheet, plan, w, sheet->words[w][first]);
+        enum word_kind kind = choose_word_kind(sheet, plan, w, sheet->words[w][first]);
         if (kind != WORD_REPEATED) {
             memcpy(out, &sheet->words[w][first], sizeof(uint32_t));
             out += sizeof(uint32_t);
@@ -352,7 +352,7 @@ ROWS_INLINE const unsigned char *read_word(const unsigned char *in, const sheet_
         in = unpack_residuals(in, nibbles[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &residuals);
         if (i) {
             if (mask != 0xffff) residuals = expand_lanes(residuals, mask);
-            if (plan->fresh[i]) predict_fresh_lanes(plan, i, &f);
+            if (plan->fresh[i]) predict_lanes_without_predecessor(plan, i, &f);
             values = f.last + (f.slope & slopes) + zigzag_decode(residuals);
             update_prediction(&f, values, mask, plan->fresh[i]);
         } else {

@@ -5,7 +5,7 @@
 
 #include "memory.h"
 
-insitu_status comp_mpi_status(int code, base_error *error)
+insitu_status comp_convert_mpi_error(int code, base_error *error)
 {
     if (code == MPI_SUCCESS) return INSITU_OK;
     char text[MPI_MAX_ERROR_STRING] = "";
@@ -29,7 +29,7 @@ insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, bas
     MPI_Comm_rank(comm, &rank);
     const int64_t mine[2] = {own ? ((int64_t)own << 32) - rank : 0, maximum ? *maximum : 0};
     int64_t all[2] = {0, 0};
-    const insitu_status status = comp_mpi_status(MPI_Allreduce(mine, all, 2, MPI_INT64_T, MPI_MAX, comm), error);
+    const insitu_status status = comp_convert_mpi_error(MPI_Allreduce(mine, all, 2, MPI_INT64_T, MPI_MAX, comm), error);
     if (status != INSITU_OK) return status;
     if (maximum) *maximum = all[1];
     const insitu_status worst = (insitu_status)((all[0] + INT32_MAX) >> 32);
@@ -73,7 +73,7 @@ insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maxim
     items[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
     items[count + 1] = (comp_claim){(int32_t)(*maximum < INT32_MAX ? *maximum : INT32_MAX), 0};
     const insitu_status status =
-        comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
+        comp_convert_mpi_error(MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
     if (status != INSITU_OK) return status;
     *maximum = items[count + 1].priority;
     return report_status(own, (insitu_status)(items[count].priority >> SHIFT), MASK - (items[count].priority & MASK),

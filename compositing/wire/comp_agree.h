@@ -34,6 +34,6 @@ insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maxim
                                 base_error *error);
 
 /* Converts an MPI error code: returns INSITU_OK, or INSITU_ERROR_MPI with the text of MPI_Error_string(). Local. */
-insitu_status comp_mpi_status(int code, base_error *error);
+insitu_status comp_convert_mpi_error(int code, base_error *error);
 
 #endif

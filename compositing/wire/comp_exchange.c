@@ -15,9 +15,9 @@ static insitu_status run_rounds(comp_transport *transport, const comp_route *rou
 {
     for (int i = 0; i < route->round_count; i++) {
         comp_messages on_the_way = {NULL, NULL};
-        if (!status) status = comp_forward(held, route, i, transport->rank, &on_the_way, error);
+        if (!status) status = comp_forward_parcels(held, route, i, transport->rank, &on_the_way, error);
         if (i == 0) comp_messages_append(&on_the_way, out);
-        status = comp_messages_round(transport, route, i, &on_the_way, held, status, error);
+        status = comp_messages_run_round(transport, route, i, &on_the_way, held, status, error);
     }
     return status;
 }
@@ -25,12 +25,12 @@ static insitu_status run_rounds(comp_transport *transport, const comp_route *rou
 insitu_status comp_exchange(comp_transport *transport, const comp_route *route, const comp_strips *strips,
                             const comp_owners *owners, comp_messages *held, insitu_status status, base_error *error)
 {
-    const bool is_owner = comp_route_position(route, transport->rank) < route->owners;
+    const bool is_owner = comp_find_place_of_rank(route, transport->rank) < route->owners;
     comp_messages out = {NULL, NULL};
     *held = (comp_messages){NULL, NULL};
     if (!status) status = comp_pack(strips, owners, route, transport->rank, &out, held, error);
-    status =
-        comp_messages_to_owners(transport, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
+    status = comp_messages_send_to_owners(transport, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held,
+                                          status, error);
     status = run_rounds(transport, route, &out, held, status, error);
     if (status) comp_messages_free(held);
     return status;

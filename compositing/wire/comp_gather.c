@@ -19,7 +19,7 @@ int comp_gather_parent(const comp_route *route, int place)
     return (place / route->nodes.ranks - 1) / COMP_GATHER_FAN * route->nodes.ranks;
 }
 
-int comp_gather_children(const comp_route *route, int place)
+int comp_count_gather_children(const comp_route *route, int place)
 {
     const int ranks = route->nodes.ranks, nodes = route->owners / ranks, node = place / ranks;
     if (place % ranks) return 0;
@@ -76,7 +76,7 @@ static int receive_message(comp_transport *transport, int *bytes)
     return code;
 }
 
-static void store_message(comp_transport *transport, int bytes, const comp_canvas *canvas)
+static void store_pixels_of_message(comp_transport *transport, int bytes, const comp_canvas *canvas)
 {
     for (const unsigned char *at = transport->receive_buffer + COMP_MESSAGE_HEAD,
                              *end = transport->receive_buffer + bytes;
@@ -99,12 +99,12 @@ static int receive_at_root(comp_transport *transport, int children, const comp_c
         code = receive_message(transport, &bytes);
         if (code != MPI_SUCCESS) break;
         children -= !transport->receive_buffer[0];
-        store_message(transport, bytes, canvas);
+        store_pixels_of_message(transport, bytes, canvas);
     }
     return code;
 }
 
-static void forward_children(parent_link *link, int children)
+static void forward_messages_of_children(parent_link *link, int children)
 {
     comp_transport *const transport = link->transport;
     while (children > 0 && link->code == MPI_SUCCESS) {
@@ -123,16 +123,16 @@ static void forward_children(parent_link *link, int children)
 insitu_status comp_gather(comp_transport *transport, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error)
 {
-    const int place = comp_route_position(route, transport->rank);
+    const int place = comp_find_place_of_rank(route, transport->rank);
     int code = MPI_SUCCESS;
     if (place < route->owners && place > 0) {
-        parent_link link = {transport, comp_route_rank(route, comp_gather_parent(route, place)), MPI_SUCCESS};
+        parent_link link = {transport, comp_find_rank_at_place(route, comp_gather_parent(route, place)), MPI_SUCCESS};
         if (!status) send_own_pixels(&link, finished);
-        forward_children(&link, comp_gather_children(route, place));
+        forward_messages_of_children(&link, comp_count_gather_children(route, place));
         code = link.code;
     } else if (place == 0) {
-        code = receive_at_root(transport, comp_gather_children(route, place), canvas);
+        code = receive_at_root(transport, comp_count_gather_children(route, place), canvas);
     }
     comp_messages_free(finished);
-    return status ? status : comp_mpi_status(code, error);
+    return status ? status : comp_convert_mpi_error(code, error);
 }

@@ -13,10 +13,10 @@
  * rank is treated as a compute node. */
 enum { COMP_GATHER_FAN = 64 };
 
-/* comp_gather_parent() returns the place to which the given place (>= 1) sends; comp_gather_children() returns the
- * number of places that send to the given place. */
+/* comp_gather_parent() returns the place to which the given place (>= 1) sends; comp_count_gather_children() returns
+ * the number of places that send to the given place. */
 int comp_gather_parent(const comp_route *route, int place);
-int comp_gather_children(const comp_route *route, int place);
+int comp_count_gather_children(const comp_route *route, int place);
 
 /* The picture in which rank 0 stores pixels, with its grid and background. */
 typedef struct comp_canvas {

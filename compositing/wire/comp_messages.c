@@ -59,7 +59,7 @@ static bool add_message(comp_writer *w, size_t bytes)
     return true;
 }
 
-static void write_head(comp_message *m, size_t parcel, uint32_t owner, uint32_t records)
+static void write_parcel_header(comp_message *m, size_t parcel, uint32_t owner, uint32_t records)
 {
     const uint32_t head[3] = {owner, records, (uint32_t)((size_t)m->bytes - parcel - COMP_PARCEL_HEAD)};
     memcpy(m->data + parcel, head, sizeof head);
@@ -82,7 +82,7 @@ unsigned char *comp_writer_reserve(comp_writer *w, uint32_t owner, size_t bytes,
     if (!w->parcel || find_parcel_owner(w) != owner) {
         w->parcel = (size_t)m->bytes;
         m->bytes += COMP_PARCEL_HEAD;
-        write_head(m, w->parcel, owner, 0);
+        write_parcel_header(m, w->parcel, owner, 0);
     }
     return m->data + m->bytes;
 }
@@ -93,7 +93,7 @@ void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
     uint32_t head[3];
     memcpy(head, m->data + w->parcel, sizeof head);
     m->bytes = (int)(end - m->data);
-    write_head(m, w->parcel, head[0], head[1] + records);
+    write_parcel_header(m, w->parcel, head[0], head[1] + records);
 }
 
 /* ---- rounds of messages ----------------------------------------------------------------------------------------- */
@@ -140,7 +140,7 @@ static void fail_memory(round *r, int bytes)
 
 static void check_mpi(round *r, int code)
 {
-    if (code != MPI_SUCCESS && r->status == INSITU_OK) r->status = comp_mpi_status(code, r->error);
+    if (code != MPI_SUCCESS && r->status == INSITU_OK) r->status = comp_convert_mpi_error(code, r->error);
 }
 
 static void send_data(round *r, const unsigned char *data, int bytes, int rank)
@@ -187,7 +187,7 @@ static void receive_message(round *r, MPI_Message *found, const MPI_Status *stat
     comp_messages_append(r->in, &(comp_messages){m, m});
 }
 
-static void receive_dense(round *r)
+static void receive_dense_round(round *r)
 {
     while (r->open_partners > 0) {
         MPI_Message found;
@@ -200,7 +200,7 @@ static void receive_dense(round *r)
     check_mpi(r, MPI_Waitall(r->request_count, r->requests, MPI_STATUSES_IGNORE));
 }
 
-static void receive_sparse(round *r)
+static void receive_sparse_round(round *r)
 {
     MPI_Request barrier = MPI_REQUEST_NULL;
     int is_over = 0, code = MPI_SUCCESS;
@@ -239,19 +239,19 @@ static insitu_status run_round(round *r, comp_messages *out)
 {
     for (const comp_message *m = out->first; m; m = m->next) send_data(r, m->data, m->bytes, m->rank);
     if (r->is_sparse)
-        receive_sparse(r);
+        receive_sparse_round(r);
     else
-        receive_dense(r);
+        receive_dense_round(r);
     if (r->requests != r->transport->reserved_requests) base_free(r->requests);
     comp_messages_free(out);
     if (r->status) comp_messages_free(r->in);
     return r->status;
 }
 
-insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int number, comp_messages *out,
-                                  comp_messages *in, insitu_status status, base_error *error)
+insitu_status comp_messages_run_round(comp_transport *transport, const comp_route *route, int number,
+                                      comp_messages *out, comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_position(route, transport->rank), stride = comp_route_stride(route, number);
+    const int place = comp_find_place_of_rank(route, transport->rank), stride = comp_route_stride(route, number);
     const bool takes_part = place < route->owners;
     const int partners = takes_part ? route->radix[number] - 1 : 0;
     round r = {.transport = transport, .tag = TAG_ROUND + number, .in = in, .status = status, .error = error};
@@ -262,16 +262,16 @@ insitu_status comp_messages_round(comp_transport *transport, const comp_route *r
     const int own = comp_route_digit(route, number, stride, place);
     for (int i = 1; i <= partners && !r.is_sparse; i++) {
         const int digit = (own + i) % route->radix[number];
-        const int rank = comp_route_rank(route, comp_route_partner(route, number, stride, place, digit));
+        const int rank = comp_find_rank_at_place(route, comp_route_partner(route, number, stride, place, digit));
         if (!mark_final_message(out, rank)) send_data(&r, last_message, LAST_MESSAGE_BYTES, rank);
     }
     return run_round(&r, out);
 }
 
-insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
-                                      comp_messages *in, insitu_status status, base_error *error)
+insitu_status comp_messages_send_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                           comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_position(route, transport->rank);
+    const int place = comp_find_place_of_rank(route, transport->rank);
     const bool sends_all = place >= route->owners, receives_all = place + route->owners < route->ranks;
     round r = {.transport = transport,
                .tag = TAG_FOLD,
@@ -281,7 +281,7 @@ insitu_status comp_messages_to_owners(comp_transport *transport, const comp_rout
                .error = error};
     if (!sends_all && !receives_all) return status;
     make_requests(&r, out, 1);
-    const int partner = sends_all ? comp_route_rank(route, place - route->owners) : 0;
+    const int partner = sends_all ? comp_find_rank_at_place(route, place - route->owners) : 0;
     if (sends_all && !mark_final_message(out, partner)) send_data(&r, last_message, LAST_MESSAGE_BYTES, partner);
     return run_round(&r, out);
 }

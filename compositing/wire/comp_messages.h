@@ -78,12 +78,12 @@ void comp_transport_close(comp_transport *transport);
 /* Runs one round: sends the messages in `out`; *in receives the messages of other ranks; the caller must free them.
  * `status` is this rank's status before the call; if it is an error, the rank sends no fragments, and received messages
  * are discarded. Returns this rank's own status. Collective. */
-insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
-                                  comp_messages *in, insitu_status status, base_error *error);
+insitu_status comp_messages_run_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
+                                      comp_messages *in, insitu_status status, base_error *error);
 
 /* Before the first round, ranks that cannot own pixels send all their fragments to their partners. The partners are
  * owners. */
-insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
-                                      comp_messages *in, insitu_status status, base_error *error);
+insitu_status comp_messages_send_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                           comp_messages *in, insitu_status status, base_error *error);
 
 #endif

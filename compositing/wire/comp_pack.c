@@ -34,11 +34,11 @@ static bool sort_strips(const comp_owners *owners, owner_strips *c)
     c->starts = base_calloc((size_t)owners->count + 1, sizeof *c->starts);
     if (!c->order || !c->starts) return false;
     for (uint32_t s = 0; s < strips; s++)
-        if (ranges[s + 1] > ranges[s]) c->starts[owners->places[comp_grid_block(grid, s)]]++;
+        if (ranges[s + 1] > ranges[s]) c->starts[owners->places[comp_find_block_of_strip(grid, s)]]++;
     for (int k = 0; k < owners->count; k++) c->starts[k] = sum += c->starts[k];
     c->starts[owners->count] = sum;
     for (uint32_t s = strips; s-- > 0;)
-        if (ranges[s + 1] > ranges[s]) c->order[--c->starts[owners->places[comp_grid_block(grid, s)]]] = s;
+        if (ranges[s + 1] > ranges[s]) c->order[--c->starts[owners->places[comp_find_block_of_strip(grid, s)]]] = s;
     return true;
 }
 
@@ -63,15 +63,15 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
 /* Packs this rank's fragments for one owner, in a part of the strips that contain such fragments. These strips are
  * divided into `part_count` parts of about equal length; `part_index` is the index of the part. Returns false if memory
  * ran out. */
-static bool pack_owner(const owner_strips *c, uint32_t owner, int part_index, int part_count, comp_layers *layers,
-                       comp_writer *writer)
+static bool pack_fragments_for_owner(const owner_strips *c, uint32_t owner, int part_index, int part_count,
+                                     comp_layers *layers, comp_writer *writer)
 {
     const uint32_t begin = c->starts[owner], count = c->starts[owner + 1] - begin;
     const uint32_t first = begin + (uint32_t)((uint64_t)count * (uint32_t)part_index / (uint32_t)part_count);
     const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)part_index + 1) / (uint32_t)part_count);
     packing p = {writer, owner, 0};
     bool is_ok = true;
-    for (uint32_t i = first; i < end; i++) p.remaining += comp_strips_count(c->strips, c->order[i]);
+    for (uint32_t i = first; i < end; i++) p.remaining += comp_strips_count_fragments(c->strips, c->order[i]);
     for (uint32_t i = first; i < end && is_ok; i++)
         is_ok = comp_strips_pass_sheets(c->strips, c->order[i], layers, pack_sheet, &p);
     return is_ok;
@@ -91,11 +91,13 @@ static bool pack_batch(const owner_strips *c, int owners, const batch *b, comp_l
 {
     bool is_ok = true;
     for (int owner = b->digit; owner < owners && is_ok; owner += b->radix)
-        is_ok = owner == b->place || pack_owner(c, (uint32_t)owner, b->part_index, b->part_count, layers, writer);
+        is_ok = owner == b->place ||
+                pack_fragments_for_owner(c, (uint32_t)owner, b->part_index, b->part_count, layers, writer);
     return is_ok;
 }
 
-static bool pack_all(const owner_strips *c, const comp_route *route, int place, comp_messages *out, comp_messages *kept)
+static bool pack_fragments_for_all_owners(const owner_strips *c, const comp_route *route, int place, comp_messages *out,
+                                          comp_messages *kept)
 {
     const int radix = route->round_count ? route->radix[0] : 1, threads = c->strips->grid->threads;
     const bool is_beyond = place >= route->owners;
@@ -111,9 +113,9 @@ static bool pack_all(const owner_strips *c, const comp_route *route, int place, 
         for (int i = 0; i < radix * part_count; i++) {
             const int digit = is_beyond ? i / part_count : (own + i / part_count) % radix;
             const batch b = {digit, radix, place, i % part_count, part_count};
-            comp_writer writer = {.rank = comp_route_rank(route, is_beyond
-                                                                     ? place - route->owners
-                                                                     : comp_route_partner(route, 0, 1, place, digit))};
+            comp_writer writer = {
+                .rank = comp_find_rank_at_place(route, is_beyond ? place - route->owners
+                                                                 : comp_route_partner(route, 0, 1, place, digit))};
             if (is_ok) is_ok = pack_batch(c, route->owners, &b, layers, &writer);
 #pragma omp critical(comp_pack)
             comp_messages_append(digit == own ? kept : out, &writer.messages);
@@ -129,7 +131,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
                         comp_messages *out, comp_messages *kept, base_error *error)
 {
     owner_strips c = {.strips = strips};
-    const bool is_ok = sort_strips(owners, &c) && pack_all(&c, route, comp_route_position(route, rank), out, kept);
+    const bool is_ok = sort_strips(owners, &c) &&
+                       pack_fragments_for_all_owners(&c, route, comp_find_place_of_rank(route, rank), out, kept);
     base_free(c.order);
     base_free(c.starts);
     if (is_ok) return INSITU_OK;
@@ -161,15 +164,16 @@ static bool forward_parcels_with_digit(const comp_messages *in, const comp_route
     return true;
 }
 
-insitu_status comp_forward(const comp_messages *in, const comp_route *route, int round, int rank, comp_messages *out,
-                           base_error *error)
+insitu_status comp_forward_parcels(const comp_messages *in, const comp_route *route, int round, int rank,
+                                   comp_messages *out, base_error *error)
 {
-    const int place = comp_route_position(route, rank), stride = comp_route_stride(route, round);
+    const int place = comp_find_place_of_rank(route, rank), stride = comp_route_stride(route, round);
     const int own = comp_route_digit(route, round, stride, place);
     *out = (comp_messages){NULL, NULL};
     for (int i = 1; i < route->radix[round] && place < route->owners; i++) {
         const int digit = (own + i) % route->radix[round];
-        comp_writer writer = {.rank = comp_route_rank(route, comp_route_partner(route, round, stride, place, digit))};
+        comp_writer writer = {
+            .rank = comp_find_rank_at_place(route, comp_route_partner(route, round, stride, place, digit))};
         const bool is_ok = forward_parcels_with_digit(in, route, round, place, digit, &writer);
         comp_messages_append(out, &writer.messages);
         if (is_ok) continue;
@@ -203,8 +207,8 @@ static void count_or_store_sheets(const comp_messages *in, int owner, uint32_t *
     }
 }
 
-insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
-                                 base_error *error)
+insitu_status comp_received_list_sheets(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
+                                        base_error *error)
 {
     uint32_t sum = 0;
     *out = (comp_received){NULL, base_calloc((size_t)grid->strips + 1, sizeof *out->starts)};

@@ -22,8 +22,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* Copies those parcels (packed fragments for one owner) in `in` that other ranks must get in this round into messages
  * to these ranks, the partners of the round. Local. */
-insitu_status comp_forward(const comp_messages *in, const comp_route *route, int round, int rank, comp_messages *out,
-                           base_error *error);
+insitu_status comp_forward_parcels(const comp_messages *in, const comp_route *route, int round, int rank,
+                                   comp_messages *out, base_error *error);
 
 /* The received sheets of an owner, sorted by strip. `sheets` has their addresses within the messages. */
 typedef struct comp_received {
@@ -33,8 +33,8 @@ typedef struct comp_received {
 } comp_received;
 
 /* Lists, in *out, the sheets in `in` that are for this owner. Local; after an error *out is empty. */
-insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
-                                 base_error *error);
+insitu_status comp_received_list_sheets(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
+                                        base_error *error);
 
 void comp_received_free(comp_received *arrivals);
 

@@ -44,7 +44,7 @@ static void find_ranges(const comp_grid *grid, const fragment *items, int64_t fi
     for (int64_t i = first; i < end; i++) {
         if (items[i].pixel >= pixels) p->status = INSITU_ERROR_INTERNAL;
         if (p->status) return;
-        const uint32_t strip = comp_grid_strip(grid, items[i].pixel);
+        const uint32_t strip = comp_find_strip_of_pixel(grid, items[i].pixel);
         if (strip != range.strip) {
             if (range.count && !add_range(p, range)) return;
             range = (comp_range){strip, (uint32_t)i, 0};
@@ -67,7 +67,7 @@ static void sort_ranges(const part *parts, int part_count, comp_strips *out)
         for (int64_t i = parts[k].count; i-- > 0;) out->ranges[--starts[parts[k].ranges[i].strip]] = parts[k].ranges[i];
 }
 
-static insitu_status gather_parts(const part *parts, int count, comp_strips *out)
+static insitu_status concatenate_fragment_ranges(const part *parts, int count, comp_strips *out)
 {
     int64_t ranges = 0;
     for (int k = 0; k < count; k++) {
@@ -104,7 +104,7 @@ insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *list,
             find_ranges(grid, list->items, list->count * k / count, list->count * (k + 1) / count, &parts[k]);
         region_leave();
     }
-    const insitu_status status = gather_parts(parts, count, &made);
+    const insitu_status status = concatenate_fragment_ranges(parts, count, &made);
     for (int k = 0; k < count; k++) base_free(parts[k].ranges);
     if (!status) {
         *out = made;
@@ -123,7 +123,7 @@ void comp_strips_free(comp_strips *strips)
     *strips = (comp_strips){0};
 }
 
-int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
+int64_t comp_strips_count_fragments(const comp_strips *strips, uint32_t strip)
 {
     int64_t count = 0;
     for (uint32_t r = strips->starts[strip]; r < strips->starts[strip + 1]; r++) count += strips->ranges[r].count;
@@ -150,7 +150,7 @@ static bool fill_sheet_of_single_fragments(const comp_strips *s, uint32_t strip,
 /* Sorts the fragments of one pixel front to back, unless the pixel has very many. Sheet n gets the n-th fragment of
  * every pixel. If each pixel's fragments are sorted, neighbouring fragments of a sheet mostly belong to the same
  * surface, so that the sheet compresses well. */
-static void sort_pixel(const fragment **order, uint32_t count)
+static void sort_fragments_of_pixel(const fragment **order, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
     for (uint32_t i = 1; i < count; i++) {
@@ -165,7 +165,7 @@ static void sort_pixel(const fragment **order, uint32_t count)
  * layers->ends[k]. Returns false if memory ran out. */
 static bool list_fragments_by_pixel(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
-    const int64_t count = comp_strips_count(s, strip);
+    const int64_t count = comp_strips_count_fragments(s, strip);
     uint32_t *const ends = layers->ends;
     if (layers->capacity < count) {
         base_free(layers->order);
@@ -183,13 +183,13 @@ static bool list_fragments_by_pixel(const comp_strips *s, uint32_t strip, comp_l
             const fragment *const item = s->items + s->ranges[r].first + i;
             layers->order[--ends[comp_grid_index_in_strip(s->grid, item->pixel)]] = item;
         }
-    for (int k = 0; k < COMP_STRIP_PIXELS; k++) sort_pixel(layers->order + ends[k], ends[k + 1] - ends[k]);
+    for (int k = 0; k < COMP_STRIP_PIXELS; k++) sort_fragments_of_pixel(layers->order + ends[k], ends[k + 1] - ends[k]);
     return true;
 }
 
 /* Fills a sheet with the fragment of index n of each pixel of the strip, for all pixels that have more than n
  * fragments. Returns the number of these pixels. */
-static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, uint32_t strip)
+static int fill_sheet_with_nth_fragments(const comp_layers *layers, uint32_t n, comp_sheet *sheet, uint32_t strip)
 {
     int count = 0;
     comp_sheet_begin(sheet, strip);
@@ -206,9 +206,10 @@ bool comp_strips_pass_sheets(const comp_strips *s, uint32_t strip, comp_layers *
 {
     if (s->starts[strip] == s->starts[strip + 1]) return true;
     if (fill_sheet_of_single_fragments(s, strip, &layers->sheet))
-        return take(state, &layers->sheet, (int)comp_strips_count(s, strip));
+        return take(state, &layers->sheet, (int)comp_strips_count_fragments(s, strip));
     if (!list_fragments_by_pixel(s, strip, layers)) return false;
-    for (uint32_t n = 0, count; (count = (uint32_t)fill_layer(layers, n, &layers->sheet, strip)) > 0; n++)
+    for (uint32_t n = 0, count; (count = (uint32_t)fill_sheet_with_nth_fragments(layers, n, &layers->sheet, strip)) > 0;
+         n++)
         if (!take(state, &layers->sheet, (int)count)) return false;
     return true;
 }

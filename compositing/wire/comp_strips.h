@@ -29,7 +29,7 @@ insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *items
 void comp_strips_free(comp_strips *strips);
 
 /* Returns the number of the strip's fragments. */
-int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
+int64_t comp_strips_count_fragments(const comp_strips *strips, uint32_t strip);
 
 /* Buffers of one thread for comp_strips_pass_sheets(). A zeroed struct is empty. */
 typedef struct comp_layers {

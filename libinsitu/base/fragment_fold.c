@@ -13,7 +13,7 @@ static void blend_behind(fragment *front, const fragment *behind)
 
 /* Returns the height of the lowest node of the interval's binary tree that contains the leaves with the indices a and
  * b. Leaves have the height 0. */
-static int find_common_height(int32_t a, int32_t b)
+static int find_height_of_common_node(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
@@ -30,7 +30,7 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
     open[0] = sorted[0];
     for (int64_t i = 1; i < count; i++) {
         const int32_t next = fragment_find_leaf(sorted[i].t_in);
-        const int height = find_common_height(leaf, next);
+        const int height = find_height_of_common_node(leaf, next);
         leaf = next;
         if (height == 0) {
             blend_behind(&open[depth - 1], &sorted[i]);

@@ -155,7 +155,7 @@ typedef struct grid_field {
         return (double)value;                                                                                          \
     }
 
-static inline double grid_unusual_number(int unusual_type, const char *p)
+static inline double grid_read_unusual_number(int unusual_type, const char *p)
 {
     switch (unusual_type) {
     case GRID_UNUSUAL_FLOAT32: GRID_READ_UNUSUAL(float)
@@ -185,21 +185,21 @@ static inline int64_t grid_element_bytes(const grid_array *a)
 
 /* Reads an element of the array as a double. element: the address of the element. The array must have data, and not
  * coordinates that are computed from an axis. */
-static inline double grid_element_number(const grid_array *a, const char *element)
+static inline double grid_read_element_number(const grid_array *a, const char *element)
 {
     if (!a->is_integer)
         return a->is_wide ? *(const double *)(const void *)element : (double)*(const float *)(const void *)element;
-    if (a->unusual_type) return grid_unusual_number(a->unusual_type, element);
+    if (a->unusual_type) return grid_read_unusual_number(a->unusual_type, element);
     return a->is_wide ? (double)*(const int64_t *)(const void *)element
                       : (double)*(const int32_t *)(const void *)element;
 }
 
-static inline double grid_array_number(const grid_array *a, int64_t i)
+static inline double grid_read_number(const grid_array *a, int64_t i)
 {
-    return a->axis ? grid_axis_coordinate(a->axis, i) : grid_element_number(a, a->data + i * a->stride);
+    return a->axis ? grid_axis_coordinate(a->axis, i) : grid_read_element_number(a, a->data + i * a->stride);
 }
 
-static inline int64_t grid_array_index(const grid_array *a, int64_t i)
+static inline int64_t grid_read_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
     const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
@@ -211,12 +211,12 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
  * first entry of each cell or face. */
 static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
 {
-    return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);
+    return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_read_index(offsets, i + 1);
 }
 
 /* Returns the number of vertices of a cell type; 0 for unknown types, and for polyhedra and polygons, because their
  * number of vertices varies. */
-static inline int grid_type_vertices(int cell_type)
+static inline int grid_type_vertex_count(int cell_type)
 {
     switch (cell_type) {
     case GRID_TET: return 4;
@@ -255,7 +255,7 @@ static inline int grid_lattice_row_axis(const grid_lattice *l)
 }
 
 /* Returns the flat index of a cell's first vertex. */
-static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
+static inline int64_t grid_lattice_first_vertex(const grid_lattice *l, int64_t cell)
 {
     int64_t first = 0;
     for (int axis = 0; axis < 3; axis++)
@@ -289,19 +289,19 @@ static inline bool grid_lattice_is_drawn(const grid_lattice *l, int64_t cell)
  * nothing and returns 0: use grid_walk for these. */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
-    const int count = grid_type_vertices(grid_cell_type(g, cell));
+    const int count = grid_type_vertex_count(grid_cell_type(g, cell));
     if (g->lattice) {
-        const int64_t base = grid_lattice_first(g->lattice, cell);
+        const int64_t base = grid_lattice_first_vertex(g->lattice, cell);
         for (int i = 0; i < count; i++) vertices[i] = base + g->lattice->corner_offsets[i];
         return count;
     }
-    const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
-    for (int i = 0; i < count; i++) vertices[i] = grid_array_index(&g->connectivity, first + i);
+    const int64_t first = g->offsets.data ? grid_read_index(&g->offsets, cell) : cell * count;
+    for (int i = 0; i < count; i++) vertices[i] = grid_read_index(&g->connectivity, first + i);
     return count;
 }
 
 /* Returns whether the grid may contain polyhedra. */
-static inline bool grid_has_faces(const grid *g)
+static inline bool grid_may_have_polyhedra(const grid *g)
 {
     return g->face_offsets.data != 0;
 }
@@ -309,14 +309,14 @@ static inline bool grid_has_faces(const grid *g)
 /* Returns the range of a polyhedron's faces: the entries [*first, *end) of connectivity. */
 static inline void grid_cell_faces(const grid *g, int64_t cell, int64_t *first, int64_t *end)
 {
-    *first = grid_array_index(&g->offsets, cell);
+    *first = grid_read_index(&g->offsets, cell);
     *end = grid_offset_end(&g->offsets, cell);
 }
 
 /* Returns the range of a face's vertices: the entries [*first, *end) of face_connectivity. */
 static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *first, int64_t *end)
 {
-    *first = grid_array_index(&g->face_offsets, face);
+    *first = grid_read_index(&g->face_offsets, face);
     *end = grid_offset_end(&g->face_offsets, face);
 }
 
@@ -338,7 +338,7 @@ typedef struct grid_walk {
 static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
 {
     grid_walk w = {.cells = g, .vertices = &g->connectivity};
-    const int type = grid_cell_type(g, cell), count = grid_type_vertices(type);
+    const int type = grid_cell_type(g, cell), count = grid_type_vertex_count(type);
     if (type == GRID_POLYHEDRON) {
         w.vertices = &g->face_connectivity;
         grid_cell_faces(g, cell, &w.face_next, &w.face_end);
@@ -346,11 +346,11 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
     }
     if (g->lattice) {
         w.corner_offsets = g->lattice->corner_offsets;
-        w.base = grid_lattice_first(g->lattice, cell);
+        w.base = grid_lattice_first_vertex(g->lattice, cell);
         w.end = count;
         return w;
     }
-    w.next = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+    w.next = g->offsets.data ? grid_read_index(&g->offsets, cell) : cell * count;
     w.end = type == GRID_POLYGON ? grid_offset_end(&g->offsets, cell) : w.next + count;
     return w;
 }
@@ -359,7 +359,7 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
 static inline bool grid_walk_next_face(grid_walk *w)
 {
     if (w->face_next == w->face_end) return false;
-    const int64_t face = grid_array_index(&w->cells->connectivity, w->face_next++);
+    const int64_t face = grid_read_index(&w->cells->connectivity, w->face_next++);
     grid_face_vertices(w->cells, face, &w->next, &w->end);
     return true;
 }
@@ -367,7 +367,7 @@ static inline bool grid_walk_next_face(grid_walk *w)
 /* Returns the vertex of an entry between w->next and w->end. */
 static inline int64_t grid_walk_vertex(const grid_walk *w, int64_t entry)
 {
-    return w->corner_offsets ? w->base + w->corner_offsets[entry] : grid_array_index(w->vertices, entry);
+    return w->corner_offsets ? w->base + w->corner_offsets[entry] : grid_read_index(w->vertices, entry);
 }
 
 /* Stores the next vertex; returns false after the last one. */
@@ -379,13 +379,13 @@ static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
     return true;
 }
 
-static inline void grid_vertex(const grid *g, int64_t vertex, double position[3])
+static inline void grid_read_vertex_position(const grid *g, int64_t vertex, double position[3])
 {
-    for (int axis = 0; axis < 3; axis++) position[axis] = grid_array_number(&g->coordinates[axis], vertex);
+    for (int axis = 0; axis < 3; axis++) position[axis] = grid_read_number(&g->coordinates[axis], vertex);
 }
 
 /* Returns whether the flag of a cell is nonzero. The grid must have flags. */
-static inline bool grid_is_flagged(const grid *g, int64_t cell)
+static inline bool grid_is_flagged_as_ghost(const grid *g, int64_t cell)
 {
     const char *p = g->ghosts + cell * g->ghosts_stride;
     if (g->ghosts_bytes == 1) return *p != 0;
@@ -394,7 +394,7 @@ static inline bool grid_is_flagged(const grid *g, int64_t cell)
 
 static inline bool grid_is_ghost(const grid *g, int64_t cell)
 {
-    if (g->ghosts && grid_is_flagged(g, cell)) return true;
+    if (g->ghosts && grid_is_flagged_as_ghost(g, cell)) return true;
     return g->lattice && g->lattice->has_ghosts && !grid_lattice_is_drawn(g->lattice, cell);
 }
 
@@ -439,8 +439,9 @@ static inline grid_array grid_field_component(const grid_field *f, int component
  * the value. */
 static inline double grid_field_component_value(const grid_field *f, int component, int64_t i)
 {
-    if (f->component_arrays) return grid_array_number(&f->component_arrays[component], i);
-    return grid_element_number(&f->values, f->values.data + component * f->component_stride + i * f->values.stride);
+    if (f->component_arrays) return grid_read_number(&f->component_arrays[component], i);
+    return grid_read_element_number(&f->values,
+                                    f->values.data + component * f->component_stride + i * f->values.stride);
 }
 
 static inline double grid_field_value(const grid_field *f, int64_t i)

@@ -21,7 +21,7 @@ static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_
  * session. The cast removes const, because recording the error is the only change of the session. */
 static bool refuse_call_in_fill(const insitu_session *session, const char *call)
 {
-    return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
+    return session_refuse_call_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
 }
 
 const char *insitu_error(const insitu_session *session)
@@ -95,7 +95,7 @@ static insitu_status create_session(const session_team *team, const session_scen
     if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;
-    session_team_find_nodes(&session->team);
+    session_team_find_node_layout(&session->team);
     session->space.scale = 1;
     session_report_create(&session->report);
     status = session_load_scene(&session->scene_file, &session->team, source, error);
@@ -122,12 +122,12 @@ static insitu_status open_session(MPI_Comm comm, const session_scene_source *sou
     if (is_inter)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s: an inter-communicator is not supported", source->call);
     session_guard guard;
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     session_team team;
     insitu_status status = session_team_create(comm, &team, error);
     if (!status) status = create_session(&team, source, out, error);
     if (status) session_team_free(&team);
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     return status;
 }
 
@@ -225,10 +225,10 @@ insitu_status insitu_destroy(insitu_session **session)
         return INSITU_ERROR_ARGUMENT;
     }
     session_writer_drain(&s->writer);
-    session_writer_collect(&s->writer, &s->report);
+    session_writer_collect_results(&s->writer, &s->report);
     if (s->writer.failure_count) thread_error = session_writer_take_failure(&s->writer);
     if (is_mpi_running()) {
-        session_share_error(s->team.comm, 0, &thread_error);
+        session_broadcast_error(s->team.comm, 0, &thread_error);
         session_team_free(&s->team);
     }
     free_session(s);

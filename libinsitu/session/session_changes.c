@@ -71,7 +71,7 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     const session_team *team = &session->team;
     const session_meshes *meshes = &session->meshes;
     const session_scene_file *file = &session->scene_file;
-    const int64_t names = (int64_t)(session_hash_names(meshes) >> 1);
+    const int64_t names = (int64_t)(session_hash_mesh_table(meshes) >> 1);
     words[CYCLE_HIGH] = cycle;
     /* the complement decreases as the cycle increases, like a negative number, but cannot overflow */
     words[CYCLE_LOW] = ~cycle;
@@ -125,7 +125,7 @@ static void report_pending_error(int root, const session_meshes *meshes, const s
 {
     const base_error *mine = session_find_pending_error(meshes);
     if (team->rank == root && mine) base_fail(shared, mine->status, "rank %d: %.900s", root, mine->message);
-    session_share_error(team->comm, root, shared);
+    session_broadcast_error(team->comm, root, shared);
 }
 
 insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,

@@ -48,7 +48,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     const scene old = s->scene_file.scene;
     /* waits until all pictures are written, so that the writing thread no longer uses the old scene */
     session_writer_drain(&s->writer);
-    session_writer_collect(&s->writer, &s->report);
+    session_writer_collect_results(&s->writer, &s->report);
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_writer_drop_memory(&s->writer);
     session_run_ranges_free(&s->run_ranges);
@@ -62,13 +62,13 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     s->catalogue.are_derived = false;
     for (int i = 0; i < s->meshes.count; i++) {
         session_drop_scalars(s->meshes.items[i]);
-        session_drop_derived(s->meshes.items[i]);
+        session_drop_derived_fields(s->meshes.items[i]);
     }
     const scene *now = &s->scene_file.scene;
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory &&
                                  now->is_surface_error_given == old.is_surface_error_given;
     if (are_same_pieces) return;
-    session_end_finer_lattices(&s->meshes);
+    session_free_finer_lattices(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
 }
@@ -121,11 +121,12 @@ static void update_statistics_and_conditions(insitu_session *s, session_plan_bas
     const session_event_time now = {moment->cycle, moment->time};
     const bool images = session_count_due_images(basis->scene, moment) > 0;
     s->events.held_conditions = 0;
-    if (session_has_events(basis->scene, moment->cycle, images)) {
+    if (session_are_any_statistics_needed(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
         const session_valid_events valid = session_check_event_fields(basis, images, error);
         if (derive_for_events(s, moment, images, &own) == INSITU_OK)
-            session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &valid, &own);
+            session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
+                                               &valid, &own);
         if (!error->status) *error = own;
     }
     basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);
@@ -275,7 +276,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status = session_compute_derived(&derived, session_find_derived_fields_of_plan(basis.scene, &plan), error);
     if (!status &&
         (plan.recentring_count || plan.surface_count || session_plan_has_smooth_normals(&plan, &s->catalogue)))
-        status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
+        status = session_update_home_ranks(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
     if (!status)
         status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);
     if (!status) status = session_find_smooth_gradients(&plan, &s->catalogue, &s->meshes, team, extent, error);
@@ -308,7 +309,7 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
         s->news.is_new = true;
     }
     if (s->team.rank == 0) s->report.public_report.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
-    session_begin_cinema(&s->cinema, changes->cycle);
+    session_store_first_cinema_cycle(&s->cinema, changes->cycle);
     base_error refused = {.status = INSITU_OK};
     insitu_status status = session_check_input(changes, &s->meshes, &s->team, &refused, error);
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
@@ -316,13 +317,14 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
     s->last_time = changes->time;
     const bool are_images_due = session_count_due_images(&s->scene_file.scene, &moment) > 0;
     if (status) return status;
-    if (!(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) {
+    if (!(are_images_due || session_are_any_statistics_needed(&s->scene_file.scene, moment.cycle, false))) {
         *error = refused;
         return error->status;
     }
     select_lowest_instruction_set(changes, &s->report);
-    status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
-                                   changes->needs_more_threads || changes->is_scene_changed, guard, &s->report, error);
+    status =
+        session_prepare_threads(&s->threads, &s->team, s->scene_file.scene.threads,
+                                changes->needs_more_threads || changes->is_scene_changed, guard, &s->report, error);
     if (status) return status;
     return draw_due_images(s, changes, &moment, &refused, error);
 }
@@ -333,7 +335,7 @@ static insitu_status report_unwritten_pictures(insitu_session *s, base_error *er
 {
     base_error told = {.status = INSITU_OK};
     if (s->team.rank == 0) told = session_writer_take_failure(&s->writer);
-    session_share_error(s->team.comm, 0, &told);
+    session_broadcast_error(s->team.comm, 0, &told);
     *error = told;
     return error->status;
 }
@@ -363,21 +365,21 @@ static void queue_report_json(insitu_session *s)
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
 {
-    if (!session || session_refuse_in_fill(&session->meshes, "insitu_step")) return INSITU_ERROR_ARGUMENT;
+    if (!session || session_refuse_call_in_fill(&session->meshes, "insitu_step")) return INSITU_ERROR_ARGUMENT;
     session_guard guard;
-    session_guard_begin(&guard);
+    session_guard_save_settings(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
     session_free_kept_pictures(&session->kept_pictures);
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
-    session_writer_collect(&session->writer, &session->report);
+    session_writer_collect_results(&session->writer, &session->report);
     warn_of_environment(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
         session_warn_of_unused_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.reporting_rank >= 0)
-        status = session_share_warnings(&session->report, changes.reporting_rank, &session->team, &session->error);
+        status = session_broadcast_warnings(&session->report, changes.reporting_rank, &session->team, &session->error);
     if (!status) {
         status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);
@@ -388,6 +390,6 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
                             &session->report);
     session_release_filled_arrays(&session->meshes);
     session->report.public_report.total_ms = milliseconds_since(start);
-    session_guard_end(&guard);
+    session_guard_restore_settings(&guard);
     return status;
 }

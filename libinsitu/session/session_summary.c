@@ -217,7 +217,7 @@ static bool is_shown(const session_mesh *mesh)
 /* Returns the number of the caller's cells that the mesh's tree contains. */
 static int64_t count_tree_cells(const session_mesh *mesh)
 {
-    return mesh->topology.is_split ? session_count_parents_of_pieces(mesh, mesh->tree.cells, mesh->tree.cell_count)
+    return mesh->topology.is_split ? session_count_cells_of_pieces(mesh, mesh->tree.cells, mesh->tree.cell_count)
                                    : mesh->tree.cell_count;
 }
 

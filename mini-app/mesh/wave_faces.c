@@ -67,7 +67,7 @@ static bool is_on_wall(const wave_mesh *mesh, int32_t cell, int face)
     unsigned low = 7, high = 7;
     for (int i = 0; i < shape->face_size[face]; ++i) {
         int ijk[3];
-        if (!wave_lattice_vertex_ijk(lattice, mesh->vertex_ids[v[shape->face[face][i]]], ijk)) return false;
+        if (!wave_lattice_find_vertex_indices(lattice, mesh->vertex_ids[v[shape->face[face][i]]], ijk)) return false;
         for (int a = 0; a < 3; ++a) {
             if (ijk[a] != 0) low &= ~(1u << a);
             if (ijk[a] != lattice->size[a]) high &= ~(1u << a);

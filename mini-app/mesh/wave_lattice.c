@@ -46,19 +46,19 @@ int64_t wave_lattice_cube_count(const wave_lattice *lattice)
     return (int64_t)lattice->size[0] * lattice->size[1] * lattice->size[2];
 }
 
-int64_t wave_lattice_cube(const wave_lattice *lattice, const int ijk[3])
+int64_t wave_lattice_find_cube_id(const wave_lattice *lattice, const int ijk[3])
 {
     return ijk[0] + lattice->size[0] * (ijk[1] + (int64_t)lattice->size[1] * ijk[2]);
 }
 
-void wave_lattice_cube_ijk(const wave_lattice *lattice, int64_t cube, int ijk[3])
+void wave_lattice_find_cube_indices(const wave_lattice *lattice, int64_t cube, int ijk[3])
 {
     ijk[0] = (int)(cube % lattice->size[0]);
     ijk[1] = (int)(cube / lattice->size[0] % lattice->size[1]);
     ijk[2] = (int)(cube / lattice->size[0] / lattice->size[1]);
 }
 
-bool wave_lattice_holds(const wave_lattice *lattice, const int ijk[3])
+bool wave_lattice_contains_cube(const wave_lattice *lattice, const int ijk[3])
 {
     for (int a = 0; a < 3; ++a) {
         if (ijk[a] < 0 || ijk[a] >= lattice->size[a]) return false;
@@ -87,17 +87,17 @@ static wave_cells find_cube_kind(const wave_lattice *lattice, const int ijk[3])
     return ijk[0] < lattice->size[0] / 3 ? WAVE_PYRAMIDS : WAVE_HEXES;
 }
 
-static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3], int face)
+static bool does_neighbour_split_face(const wave_lattice *lattice, const int ijk[3], int face)
 {
     int axis = cube_face[face].axis;
     int beside[3] = {ijk[0], ijk[1], ijk[2]};
     beside[axis] += cube_face[face].step;
-    if (!wave_lattice_holds(lattice, beside)) return false;
+    if (!wave_lattice_contains_cube(lattice, beside)) return false;
     wave_cells kind = find_cube_kind(lattice, beside);
     return kind == WAVE_TETS || (kind == WAVE_WEDGES && axis == 2);
 }
 
-static int cut_tets(const int64_t v[8], wave_cell *cells)
+static int split_cube_into_tets(const int64_t v[8], wave_cell *cells)
 {
     /* Each tet has the vertices of a path along edges of the cube from corner 0 to corner 6. The path follows the three
      * axes in one of six orders. If the order is an odd permutation of x, y, z, the two vertices in the middle are
@@ -109,15 +109,15 @@ static int cut_tets(const int64_t v[8], wave_cell *cells)
     return 6;
 }
 
-static int cut_wedges(const int64_t v[8], wave_cell *cells)
+static int split_cube_into_wedges(const int64_t v[8], wave_cell *cells)
 {
     cells[0] = (wave_cell){WAVE_TYPE_WEDGE, {v[0], v[1], v[2], v[4], v[5], v[6]}};
     cells[1] = (wave_cell){WAVE_TYPE_WEDGE, {v[0], v[2], v[3], v[4], v[6], v[7]}};
     return 2;
 }
 
-static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int64_t v[8], int64_t centre,
-                        wave_cell *cells)
+static int split_cube_into_pyramids(const wave_lattice *lattice, const int ijk[3], const int64_t v[8], int64_t centre,
+                                    wave_cell *cells)
 {
     int count = 0;
     for (int f = 0; f < 6; ++f) {
@@ -130,7 +130,7 @@ static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int
             least = q[i] < q[least] ? i : least;
         }
         int64_t a = q[least], b = q[(least + 1) % 4], c = q[(least + 2) % 4], d = q[(least + 3) % 4];
-        if (neighbour_wants_split(lattice, ijk, f)) {
+        if (does_neighbour_split_face(lattice, ijk, f)) {
             cells[count++] = (wave_cell){WAVE_TYPE_TET, {a, c, b, centre}};
             cells[count++] = (wave_cell){WAVE_TYPE_TET, {a, d, c, centre}};
         } else {
@@ -140,16 +140,16 @@ static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int
     return count;
 }
 
-int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE])
+int wave_lattice_make_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE])
 {
     int ijk[3];
     int64_t v[8];
-    wave_lattice_cube_ijk(lattice, cube, ijk);
+    wave_lattice_find_cube_indices(lattice, cube, ijk);
     for (int c = 0; c < 8; ++c) v[c] = find_corner_vertex(lattice, ijk, c);
     switch (find_cube_kind(lattice, ijk)) {
-    case WAVE_TETS: return cut_tets(v, cells);
-    case WAVE_WEDGES: return cut_wedges(v, cells);
-    case WAVE_PYRAMIDS: return cut_pyramids(lattice, ijk, v, lattice_vertex_count(lattice) + cube, cells);
+    case WAVE_TETS: return split_cube_into_tets(v, cells);
+    case WAVE_WEDGES: return split_cube_into_wedges(v, cells);
+    case WAVE_PYRAMIDS: return split_cube_into_pyramids(lattice, ijk, v, lattice_vertex_count(lattice) + cube, cells);
     default: cells[0] = (wave_cell){WAVE_TYPE_HEX, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]}}; return 1;
     }
 }
@@ -160,11 +160,11 @@ uint8_t wave_lattice_uniform_type(const wave_lattice *lattice)
     return type[lattice->cells];
 }
 
-bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3])
+bool wave_lattice_find_vertex_indices(const wave_lattice *lattice, int64_t vertex, int ijk[3])
 {
     int64_t corners = lattice_vertex_count(lattice);
     if (vertex >= corners) {
-        wave_lattice_cube_ijk(lattice, vertex - corners, ijk);
+        wave_lattice_find_cube_indices(lattice, vertex - corners, ijk);
         return false;
     }
     int64_t nx = lattice->size[0] + 1, ny = lattice->size[1] + 1;
@@ -174,11 +174,11 @@ bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ij
     return true;
 }
 
-uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex)
+uint8_t wave_lattice_find_walls(const wave_lattice *lattice, int64_t vertex)
 {
     int ijk[3];
     unsigned walls = 0;
-    if (!wave_lattice_vertex_ijk(lattice, vertex, ijk)) return 0;
+    if (!wave_lattice_find_vertex_indices(lattice, vertex, ijk)) return 0;
     for (int a = 0; a < 3; ++a) {
         if (ijk[a] == 0 || ijk[a] == lattice->size[a]) walls |= 1u << a;
     }
@@ -199,10 +199,10 @@ static void compute_corner_position(const wave_lattice *lattice, int64_t vertex,
     }
 }
 
-void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3])
+void wave_lattice_compute_position(const wave_lattice *lattice, int64_t vertex, double xyz[3])
 {
     int ijk[3];
-    if (wave_lattice_vertex_ijk(lattice, vertex, ijk)) {
+    if (wave_lattice_find_vertex_indices(lattice, vertex, ijk)) {
         compute_corner_position(lattice, vertex, ijk, xyz);
         return;
     }

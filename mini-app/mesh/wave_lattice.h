@@ -31,23 +31,23 @@ typedef struct wave_cell {
 wave_lattice wave_lattice_make(const int size[3], wave_cells cells, double jitter);
 
 int64_t wave_lattice_cube_count(const wave_lattice *lattice);
-int64_t wave_lattice_cube(const wave_lattice *lattice, const int ijk[3]);
-void wave_lattice_cube_ijk(const wave_lattice *lattice, int64_t cube, int ijk[3]);
-bool wave_lattice_holds(const wave_lattice *lattice, const int ijk[3]);
+int64_t wave_lattice_find_cube_id(const wave_lattice *lattice, const int ijk[3]);
+void wave_lattice_find_cube_indices(const wave_lattice *lattice, int64_t cube, int ijk[3]);
+bool wave_lattice_contains_cube(const wave_lattice *lattice, const int ijk[3]);
 
 /* Computes the cells of a cube, in an order that depends only on the cube. Returns their number. */
-int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE]);
+int wave_lattice_make_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE]);
 
 /* Returns the type of all cells, or 0 if they are mixed. */
 uint8_t wave_lattice_uniform_type(const wave_lattice *lattice);
 
 /* Computes the indices (i, j, k) of a vertex of the lattice, and returns true. If the vertex is the centre of a cube,
  * returns false, and *ijk receives the indices of the cube. */
-bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3]);
-void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3]);
+bool wave_lattice_find_vertex_indices(const wave_lattice *lattice, int64_t vertex, int ijk[3]);
+void wave_lattice_compute_position(const wave_lattice *lattice, int64_t vertex, double xyz[3]);
 
 /* Returns the walls on which the vertex lies: bit 1, 2 or 4 for a wall perpendicular to x, y or z. */
-uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex);
+uint8_t wave_lattice_find_walls(const wave_lattice *lattice, int64_t vertex);
 
 /* Returns a 64-bit hash (the finalizer of splitmix64). */
 static inline uint64_t wave_hash(uint64_t x)

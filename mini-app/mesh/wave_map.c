@@ -6,7 +6,7 @@
 
 #include "wave_lattice.h"
 
-static int64_t find_slot(const wave_map *map, int64_t key)
+static int64_t find_map_slot(const wave_map *map, int64_t key)
 {
     int64_t mask = map->capacity - 1;
     int64_t at = (int64_t)wave_hash((uint64_t)key) & mask;
@@ -17,7 +17,7 @@ static int64_t find_slot(const wave_map *map, int64_t key)
 int32_t wave_map_find(const wave_map *map, int64_t key)
 {
     if (map->capacity == 0) return -1;
-    int64_t at = find_slot(map, key);
+    int64_t at = find_map_slot(map, key);
     return map->keys[at] == key ? map->values[at] : -1;
 }
 
@@ -33,7 +33,7 @@ static bool grow_map(wave_map *map)
     for (int64_t i = 0; i < larger.capacity; ++i) larger.keys[i] = -1;
     for (int64_t i = 0; i < map->capacity; ++i) {
         if (map->keys[i] == -1) continue;
-        int64_t at = find_slot(&larger, map->keys[i]);
+        int64_t at = find_map_slot(&larger, map->keys[i]);
         larger.keys[at] = map->keys[i];
         larger.values[at] = map->values[i];
     }
@@ -45,7 +45,7 @@ static bool grow_map(wave_map *map)
 int32_t wave_map_insert(wave_map *map, int64_t key, int32_t value)
 {
     if (3 * map->count >= 2 * map->capacity && !grow_map(map)) return -1;
-    int64_t at = find_slot(map, key);
+    int64_t at = find_map_slot(map, key);
     if (map->keys[at] == key) return map->values[at];
     map->keys[at] = key;
     map->values[at] = value;

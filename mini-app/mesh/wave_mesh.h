@@ -26,7 +26,7 @@ typedef struct wave_mesh {
     int32_t own_vertices, vertices;
     int64_t *cell_ids;    /* global id of each cell */
     int64_t *vertex_ids;  /* global id of each vertex */
-    uint8_t *walls;       /* for each vertex the walls on which it lies, as wave_lattice_walls() returns them */
+    uint8_t *walls;       /* for each vertex the walls on which it lies, as wave_lattice_find_walls() returns them */
     uint8_t uniform_type; /* type of all cells; 0 if they are mixed */
     uint8_t *types;       /* type of each cell; NULL if all have uniform_type */
     int index_bytes;      /* size of the integers in connectivity and offsets: 4 or 8 */

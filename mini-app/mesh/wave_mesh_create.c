@@ -68,12 +68,12 @@ static bool find_own_cubes(mesh_builder *m)
 {
     const wave_partition *p = &m->mesh->partition;
     int low[3], high[3], at[3];
-    wave_partition_box(p, m->mesh->rank, low, high);
+    wave_partition_find_box(p, m->mesh->rank, low, high);
     for (at[2] = low[2]; at[2] < high[2]; ++at[2]) {
         for (at[1] = low[1]; at[1] < high[1]; ++at[1]) {
             for (at[0] = low[0]; at[0] < high[0]; ++at[0]) {
                 if (wave_partition_owner(p, at) != m->mesh->rank) continue;
-                if (!add_to_pair_list(&m->own, m->mesh->rank, wave_lattice_cube(&p->lattice, at))) return false;
+                if (!add_to_pair_list(&m->own, m->mesh->rank, wave_lattice_find_cube_id(&p->lattice, at))) return false;
             }
         }
     }
@@ -87,11 +87,11 @@ static bool list_owners_around(const wave_mesh *mesh, int64_t cube, int owner[3]
     const wave_lattice *lattice = &mesh->partition.lattice;
     int ijk[3];
     bool foreign = false;
-    wave_lattice_cube_ijk(lattice, cube, ijk);
+    wave_lattice_find_cube_indices(lattice, cube, ijk);
     for (int n = 0; n < 27; ++n) {
         int at[3] = {ijk[0] + n % 3 - 1, ijk[1] + n / 3 % 3 - 1, ijk[2] + n / 9 - 1};
         int *o = &owner[n / 9][n / 3 % 3][n % 3];
-        *o = wave_lattice_holds(lattice, at) ? wave_partition_owner(&mesh->partition, at) : -1;
+        *o = wave_lattice_contains_cube(lattice, at) ? wave_partition_owner(&mesh->partition, at) : -1;
         foreign = foreign || (*o >= 0 && *o != mesh->rank);
     }
     return foreign;
@@ -101,19 +101,19 @@ static bool add_foreign_cubes(mesh_builder *m, int64_t cube, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;
     int ijk[3];
-    wave_lattice_cube_ijk(lattice, cube, ijk);
+    wave_lattice_find_cube_indices(lattice, cube, ijk);
     for (int n = 0; n < 27; ++n) {
         int at[3] = {ijk[0] + n % 3 - 1, ijk[1] + n / 3 % 3 - 1, ijk[2] + n / 9 - 1};
         int o = owner[n / 9][n / 3 % 3][n % 3];
         if (o < 0 || o == m->mesh->rank) continue;
-        if (!add_to_pair_list(&m->foreign, o, wave_lattice_cube(lattice, at))) return false;
+        if (!add_to_pair_list(&m->foreign, o, wave_lattice_find_cube_id(lattice, at))) return false;
     }
     return true;
 }
 
 /* Adds an entry to the list of sends: the cell is to be sent to the rank. Does nothing if the list has this entry
  * already. Earlier entries of the same cell are at the end of the list. */
-static bool add_send(mesh_builder *m, int rank, int32_t cell)
+static bool add_cell_to_send(mesh_builder *m, int rank, int32_t cell)
 {
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
         if (m->sends.items[i].rank == rank) return true;
@@ -123,17 +123,17 @@ static bool add_send(mesh_builder *m, int rank, int32_t cell)
 
 /* Adds entries to the list of sends, so that the cell is sent to every rank that owns a cube with one of the cell's
  * lattice vertices as a corner. */
-static bool add_sends(mesh_builder *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
+static bool add_sends_of_cell(mesh_builder *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;
     int ijk[3], at[3];
-    wave_lattice_cube_ijk(lattice, cube, ijk);
+    wave_lattice_find_cube_indices(lattice, cube, ijk);
     for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
-        if (!wave_lattice_vertex_ijk(lattice, c->vertex[i], at)) continue;
+        if (!wave_lattice_find_vertex_indices(lattice, c->vertex[i], at)) continue;
         for (int n = 0; n < 8; ++n) {
             int o = owner[at[2] - ijk[2] + (n >> 2)][at[1] - ijk[1] + (n >> 1 & 1)][at[0] - ijk[0] + (n & 1)];
             if (o < 0 || o == m->mesh->rank) continue;
-            if (!add_send(m, o, cell)) return false;
+            if (!add_cell_to_send(m, o, cell)) return false;
         }
     }
     return true;
@@ -186,7 +186,7 @@ static bool add_vertex(mesh_builder *m, int64_t id, int32_t *local)
         if (!grow_array((void **)&mesh->walls, 1, m->vertex_capacity)) return false;
     }
     mesh->vertex_ids[mesh->vertices] = id;
-    mesh->walls[mesh->vertices] = wave_lattice_walls(&mesh->partition.lattice, id);
+    mesh->walls[mesh->vertices] = wave_lattice_find_walls(&mesh->partition.lattice, id);
     mesh->vertices++;
     return true;
 }
@@ -212,11 +212,11 @@ static bool make_own_cells(mesh_builder *m)
     int owner[3][3][3];
     for (int64_t i = 0; i < m->own.count; ++i) {
         int64_t cube = m->own.items[i].value;
-        int count = wave_lattice_cells(&m->mesh->partition.lattice, cube, cells);
+        int count = wave_lattice_make_cells(&m->mesh->partition.lattice, cube, cells);
         bool foreign = list_owners_around(m->mesh, cube, owner);
         if (foreign && !add_foreign_cubes(m, cube, owner)) return false;
         for (int c = 0; c < count; ++c) {
-            if (foreign && !add_sends(m, cube, m->mesh->cells, &cells[c], owner)) return false;
+            if (foreign && !add_sends_of_cell(m, cube, m->mesh->cells, &cells[c], owner)) return false;
             if (!add_cell(m, &cells[c], cube * WAVE_CELLS_PER_CUBE + c)) return false;
         }
     }
@@ -249,7 +249,7 @@ static bool make_halo_cells(mesh_builder *m)
     for (int64_t i = 0; i < m->foreign.count; ++i) {
         int32_t rank = m->foreign.items[i].rank;
         int64_t cube = m->foreign.items[i].value;
-        int count = wave_lattice_cells(&mesh->partition.lattice, cube, cells);
+        int count = wave_lattice_make_cells(&mesh->partition.lattice, cube, cells);
         if (mesh->link_count == 0 || mesh->links[mesh->link_count - 1].rank != rank) {
             mesh->links[mesh->link_count++] = (wave_link){.rank = rank, .receive_begin = mesh->cells};
         }
@@ -262,7 +262,7 @@ static bool make_halo_cells(mesh_builder *m)
     return true;
 }
 
-static bool make_sends(mesh_builder *m)
+static bool list_cells_to_send(mesh_builder *m)
 {
     wave_mesh *mesh = m->mesh;
     int64_t at = 0;
@@ -338,7 +338,7 @@ bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes
     mesh_builder m = {.mesh = mesh};
     bool ok = find_own_cubes(&m) && reserve_cell(&m);
     if (ok) store_index(mesh, mesh->offsets, 0, 0);
-    ok = ok && make_own_cells(&m) && make_halo_cells(&m) && make_sends(&m);
+    ok = ok && make_own_cells(&m) && make_halo_cells(&m) && list_cells_to_send(&m);
     wave_map_free(&m.vertex_map);
     free(m.own.items);
     free(m.foreign.items);

@@ -74,7 +74,7 @@ int wave_partition_owner(const wave_partition *partition, const int ijk[3])
         /* position * ranks is far below 2^63: there are at most 2^40 cubes and 2^20 ranks */
         return (int)(find_morton_position(lattice, ijk) * ranks / wave_lattice_cube_count(lattice));
     }
-    case WAVE_RANDOM: return (int)(wave_hash((uint64_t)wave_lattice_cube(lattice, ijk)) % (uint64_t)ranks);
+    case WAVE_RANDOM: return (int)(wave_hash((uint64_t)wave_lattice_find_cube_id(lattice, ijk)) % (uint64_t)ranks);
     case WAVE_CHECKERBOARD: return (int)(((int64_t)ijk[0] + ijk[1] + ijk[2]) % ranks);
     default: break;
     }
@@ -83,7 +83,7 @@ int wave_partition_owner(const wave_partition *partition, const int ijk[3])
     return (int)(block[0] + partition->blocks[0] * (block[1] + partition->blocks[1] * block[2]));
 }
 
-void wave_partition_box(const wave_partition *partition, int rank, int low[3], int high[3])
+void wave_partition_find_box(const wave_partition *partition, int rank, int low[3], int high[3])
 {
     int at = rank;
     for (int a = 0; a < 3; ++a) {

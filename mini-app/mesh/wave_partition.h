@@ -25,6 +25,6 @@ int wave_partition_owner(const wave_partition *partition, const int ijk[3]);
 
 /* Computes a box of cubes, low .. high - 1, that contains all cubes of the rank, so that only the cubes of the box have
  * to be searched. */
-void wave_partition_box(const wave_partition *partition, int rank, int low[3], int high[3]);
+void wave_partition_find_box(const wave_partition *partition, int rank, int low[3], int high[3]);
 
 #endif

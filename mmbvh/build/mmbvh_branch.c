@@ -158,7 +158,7 @@ static void partition_items(node_split *s, const branch_builder *builder)
     exchange_misplaced(s);
 }
 
-static void halve_items(node_split *s)
+static void split_items_at_median_index(node_split *s)
 {
     s->left_count = s->count / 2;
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
@@ -188,7 +188,7 @@ static void split_branch(node_split *s, const branch_builder *builder)
     s->sides[0] = s->sides[1] = item_set_empty();
     if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose_node_split(s, builder);
     if (s->split.axis < 0) {
-        halve_items(s);
+        split_items_at_median_index(s);
     } else {
         partition_items(s, builder);
     }

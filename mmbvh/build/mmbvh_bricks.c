@@ -56,8 +56,8 @@ int64_t bricks_count(const grid_lattice *lattice)
 static double compute_edge_length(const grid *g, int64_t vertex, int axis)
 {
     double from[3], to[3], sum = 0;
-    grid_vertex(g, vertex, from);
-    grid_vertex(g, vertex + g->lattice->vertex_numbering.stride[axis], to);
+    grid_read_vertex_position(g, vertex, from);
+    grid_read_vertex_position(g, vertex + g->lattice->vertex_numbering.stride[axis], to);
     for (int a = 0; a < 3; a++) sum += (to[a] - from[a]) * (to[a] - from[a]);
     return sqrt(sum);
 }
@@ -86,7 +86,7 @@ typedef struct brick_split {
     int64_t before;
 } brick_split;
 
-static bool is_small(const int64_t count[3])
+static bool is_small_brick(const int64_t count[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (count[axis] > SMALL_SIDE) return false;
@@ -128,7 +128,7 @@ static void compute_costs(bricks *s)
                 const int along = i > 1 ? 0 : j > 1 ? 1 : 2;
                 if (cells <= MMBVH_MAX_LEAF)
                     s->costs[i][j][k] = LEAF_COST + (int)(cells * (i + j + k));
-                else if (is_small(count))
+                else if (is_small_brick(count))
                     cheapest_split(s, count, (brick_split){along, 1}, &s->costs[i][j][k]);
             }
 }
@@ -143,7 +143,7 @@ static void split_brick(const bricks *s, const brick *b, brick halves[2])
     along = extent[2] > extent[along] ? 2 : along;
     int cost;
     brick_split split = {along, b->count[along] / 2};
-    if (is_small(b->count)) split = cheapest_split(s, b->count, split, &cost);
+    if (is_small_brick(b->count)) split = cheapest_split(s, b->count, split, &cost);
     halves[0] = halves[1] = *b;
     halves[0].count[split.along] = split.before;
     halves[1].first[split.along] += split.before;

@@ -62,7 +62,7 @@ static uint32_t get_candidate_cell(const build *b, int64_t i)
 }
 
 /* Returns whether the tree covers all cells of a lattice except ghost layers, so that mmbvh_bricks.c can build it. */
-static bool uses_bricks(const build *b)
+static bool can_build_bricks(const build *b)
 {
     const grid *g = b->source.g;
     return g && g->lattice && !b->selected && !g->ghosts && !g->flat;
@@ -70,7 +70,7 @@ static bool uses_bricks(const build *b)
 
 static void count_cells(build *b)
 {
-    if (uses_bricks(b)) {
+    if (can_build_bricks(b)) {
         b->count = bricks_count(b->source.g->lattice);
         return;
     }
@@ -251,12 +251,12 @@ static topology *build_topology(build *b, int threads)
     topology_build t;
     topology *root = NULL;
     if (topology_begin(&t, b->count, threads)) {
-        root = uses_bricks(b)                       ? build_bricks(b, &t)
+        root = can_build_bricks(b)                  ? build_bricks(b, &t)
                : b->options.builder == MMBVH_MORTON ? build_morton(b, &t)
                                                     : build_sah(b, &t);
     }
     topology_end(&t);
-    if (root && !uses_bricks(b) && !list_cells(b)) {
+    if (root && !can_build_bricks(b) && !list_cells(b)) {
         topology_free(root);
         root = NULL;
     }

@@ -51,7 +51,7 @@ typedef struct kernel_arrays {
     } prefetched[4];
 } kernel_arrays;
 
-static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t count)
+static inline kernel_numbers kernel_numbers_describe_array(const grid_array *a, int64_t count)
 {
     const int64_t stride = a->stride / (int64_t)sizeof(float);
     const bool is_gathered = !a->is_integer && a->stride % (int64_t)sizeof(float) == 0 && stride > 0 &&
@@ -78,13 +78,13 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->source_cells = field->source_cells;
     p->is_by_cell = field->is_cell_centred;
     if (field->component >= 0) values.data += field->component * field->component_stride;
-    p->values = kernel_numbers_of(&values, count);
+    p->values = kernel_numbers_describe_array(&values, count);
     if (field->component < 0) p->values.data = NULL;
     p->values.field = field;
     p->has_narrow_positions = true;
     for (int a = 0; a < 3; a++) {
         const grid_array *c = &g->coordinates[a];
-        p->coordinates[a] = kernel_numbers_of(c, g->vertex_count);
+        p->coordinates[a] = kernel_numbers_describe_array(c, g->vertex_count);
         p->has_narrow_positions = p->has_narrow_positions && kernel_numbers_are_narrow(&p->coordinates[a]);
         p->prefetched[a].data = c->data;
         p->prefetched[a].stride = c->stride;
@@ -104,30 +104,30 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
 /* Returns the index, in the connectivity array, of the cell's first entry; for a structured grid (grid_lattice), which
  * has no such array, the index of the cell's first vertex. vertices: number of vertices of each cell, used if the mesh
  * has no offsets. */
-SIMD_INLINE int64_t kernel_arrays_first_entry(const grid *g, uint32_t cell, int vertices)
+SIMD_INLINE int64_t kernel_arrays_find_connectivity_entry(const grid *g, uint32_t cell, int vertices)
 {
-    if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
-    return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
+    if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first_vertex(g->lattice, cell);
+    return g->offsets.data ? grid_read_index(&g->offsets, cell) : (int64_t)cell * vertices;
 }
 
 /* Stores the vertex indices of a cell of a structured grid, that of the cell's vertex i in out[i * out_stride]. */
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out,
                                           int out_stride)
 {
-    const int64_t first = grid_lattice_first(l, cell);
+    const int64_t first = grid_lattice_first_vertex(l, cell);
     for (int i = 0; i < vertices; i++) out[i * out_stride] = (int32_t)(first + l->corner_offsets[i]);
 }
 
 /* Stores a cell's vertex indices, that of vertex i in out[i * out_stride], and prefetches the coordinates and values of
  * these vertices. */
-SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
-                                        int out_stride)
+SIMD_INLINE void kernel_arrays_read_vertex_indices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
+                                                   int out_stride)
 {
     const grid_array c = p->cells->connectivity;
     if (__builtin_expect(p->cells->lattice != NULL, 0)) {
         kernel_lattice_indices(p->cells->lattice, cell, vertices, out, out_stride);
     } else {
-        const char *at = c.data + kernel_arrays_first_entry(p->cells, cell, vertices) * c.stride;
+        const char *at = c.data + kernel_arrays_find_connectivity_entry(p->cells, cell, vertices) * c.stride;
         for (int i = 0; i < vertices; i++, at += c.stride) {
             const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
             out[i * out_stride] = (int32_t)(index - c.base);
@@ -138,17 +138,17 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
             __builtin_prefetch(p->prefetched[k].data + out[i * out_stride] * p->prefetched[k].stride);
 }
 
-/* Calls kernel_arrays_vertices() for cells of any type. For tets and hexes the number of vertices is passed as a
- * constant, so that loops over vertices have constant lengths. */
-SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
-                                               int out_stride)
+/* Calls kernel_arrays_read_vertex_indices() for cells of any type. For tets and hexes the number of vertices is passed
+ * as a constant, so that loops over vertices have constant lengths. */
+SIMD_INLINE void kernel_arrays_read_indices_of_any_type(const kernel_arrays *p, uint32_t cell, int vertices,
+                                                        int32_t *out, int out_stride)
 {
     if (vertices == 4)
-        kernel_arrays_vertices(p, cell, 4, out, out_stride);
+        kernel_arrays_read_vertex_indices(p, cell, 4, out, out_stride);
     else if (vertices == 8)
-        kernel_arrays_vertices(p, cell, 8, out, out_stride);
+        kernel_arrays_read_vertex_indices(p, cell, 8, out, out_stride);
     else
-        kernel_arrays_vertices(p, cell, vertices, out, out_stride);
+        kernel_arrays_read_vertex_indices(p, cell, vertices, out, out_stride);
 }
 
 /* Returns those of the given lanes (a bit mask) whose cells are drawn: those with a finite value in source_cells, or
@@ -191,7 +191,7 @@ static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_
     }
     memcpy(at, &index, sizeof index);
     for (int n = 0; n < SIMD_WIDTH; n++)
-        v[n] = c->field ? grid_field_value(c->field, at[n]) : grid_array_number(&c->array, at[n]);
+        v[n] = c->field ? grid_field_value(c->field, at[n]) : grid_read_number(&c->array, at[n]);
     memcpy(out, v, sizeof v);
 }
 
@@ -253,7 +253,8 @@ SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a
 }
 
 /* Returns the lanes in which position a is before b in the lexicographic order of coordinates. */
-SIMD_INLINE vm kernel_raw_before(bool is_narrow, const kernel_raw_numbers a[3], const kernel_raw_numbers b[3])
+SIMD_INLINE vm kernel_is_raw_position_before(bool is_narrow, const kernel_raw_numbers a[3],
+                                             const kernel_raw_numbers b[3])
 {
     vm before = kernel_raw_lt(is_narrow, &a[2], &b[2]);
     for (int axis = 1; axis >= 0; axis--)
@@ -322,7 +323,7 @@ SIMD_INLINE float kernel_smallest_float_not_below(double x)
     return f;
 }
 
-SIMD_INLINE kernel_level kernel_level_of(double value)
+SIMD_INLINE kernel_level kernel_make_level(double value)
 {
     const float middle = (float)value;
     return (kernel_level){value, middle, (float)(value - (double)middle), kernel_smallest_float_not_below(value)};
@@ -330,14 +331,16 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 
 /* Returns the lanes in which the number v, which was read from the array c, is below `level`. The comparison is
  * exact. */
-SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
+SIMD_INLINE vm kernel_is_raw_number_below(const kernel_numbers *c, const kernel_raw_numbers *v,
+                                          const kernel_level *level)
 {
     const kernel_f64 half = (kernel_f64){0} + level->value, value[2] = {half, half};
     return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide, value);
 }
 
 /* Returns the number v, which was read from the array c, minus `level`, rounded to float32. */
-SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
+SIMD_INLINE vf kernel_subtract_level_from_raw(const kernel_numbers *c, const kernel_raw_numbers *v,
+                                              const kernel_level *level)
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;

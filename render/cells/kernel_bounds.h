@@ -155,14 +155,14 @@ SIMD_INLINE kernel_f64 kernel_f64_rounded(kernel_f64 v)
     return kernel_f64_widen(kernel_f64_narrow(v));
 }
 
-SIMD_INLINE kernel_f64 kernel_f64_more(kernel_f64 v, kernel_f64 most)
+SIMD_INLINE kernel_f64 kernel_f64_select_larger(kernel_f64 v, kernel_f64 most)
 {
     return kernel_f64_select((kernel_f64_mask)(v > most), v, most);
 }
 
 /* Returns the derivative along reference coordinate a, at the reference coordinates r, of a polynomial with
  * coefficients c (kernel_map.h). */
-SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, const double r[3])
+SIMD_INLINE kernel_f64 kernel_f64_evaluate_derivative(int type, const kernel_f64 c[8], int a, const double r[3])
 {
     if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
     kernel_f64 out = c[1 + a];
@@ -173,8 +173,8 @@ SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, 
 
 /* Returns the derivative along reference coordinate a at the reference coordinates r, minus that at the domain's
  * centre, of a polynomial whose coefficients 4 to 7 are nonlinear_part. */
-SIMD_INLINE kernel_f64 kernel_f64_slope_minus_centre(int type, const kernel_f64 nonlinear_part[4], int a,
-                                                     const double r[3])
+SIMD_INLINE kernel_f64 kernel_f64_derivative_minus_centre(int type, const kernel_f64 nonlinear_part[4], int a,
+                                                          const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
@@ -186,9 +186,10 @@ SIMD_INLINE kernel_f64 kernel_f64_slope_minus_centre(int type, const kernel_f64 
 }
 
 /* Computes the polynomial coefficients of the map and of the field from the vertices' positions and values. */
-SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH], int half)
+SIMD_INLINE void kernel_bounds_fit_polynomials(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH],
+                                               int half)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     for (int n = 0; n < 4; n++) {
         kernel_f64 d[8];
         vf v[8];
@@ -198,7 +199,7 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
         }
         if (n < 3) {
             b->reach[n] = kernel_f64_abs(d[0]);
-            for (int i = 1; i < count; i++) b->reach[n] = kernel_f64_more(kernel_f64_abs(d[i]), b->reach[n]);
+            for (int i = 1; i < count; i++) b->reach[n] = kernel_f64_select_larger(kernel_f64_abs(d[i]), b->reach[n]);
             for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
             for (int i = 0; i < count; i++) b->apart[n][i] = d[i];
         }
@@ -215,7 +216,7 @@ SIMD_INLINE void kernel_bounds_compute_nonlinear_map(kernel_bounds_lanes *b, int
     kernel_f64 m[3][3], cofactor[3][3], position[3][8];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 8; j++) position[i][j] = kernel_f64_rounded(b->exact[i][j]);
-        for (int a = 0; a < 3; a++) m[i][a] = kernel_f64_slope(type, position[i], a, centre);
+        for (int a = 0; a < 3; a++) m[i][a] = kernel_f64_evaluate_derivative(type, position[i], a, centre);
     }
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
@@ -247,7 +248,7 @@ SIMD_INLINE kernel_f64 kernel_bounds_fit_linear_function(kernel_bounds_lanes *b,
 {
     const double *centre = kernel_domain_of(type)->centre;
     kernel_f64 df[3], size = {0};
-    for (int a = 0; a < 3; a++) df[a] = kernel_f64_slope(type, b->exact[3], a, centre);
+    for (int a = 0; a < 3; a++) df[a] = kernel_f64_evaluate_derivative(type, b->exact[3], a, centre);
     for (int i = 0; i < 3; i++) {
         kernel_f64 g = {0};
         for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
@@ -274,7 +275,7 @@ SIMD_INLINE kernel_f64 kernel_f64_largest_error(int type, const kernel_f64 e[8])
         if (!kernel_is_prism(type)) at += m * e[4];
         if (kernel_is_prism(type)) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
         if (kernel_is_box(type)) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
-        most = n ? kernel_f64_more(at * at, most) : at * at;
+        most = n ? kernel_f64_select_larger(at * at, most) : at * at;
     }
     return kernel_f64_sqrt(most);
 }
@@ -289,10 +290,10 @@ SIMD_INLINE void kernel_bounds_compute_corner_derivatives(kernel_bounds_lanes *b
     for (int a = 0; a < 3; a++)
         for (int n = 0; n < table->slope_count[a]; n++) {
             const double *r = table->corners[(int)table->first[a][n]];
-            b->df[a][n] = kernel_f64_slope(type, field, a, r);
-            b->de[a][n] = kernel_f64_slope(type, b->e, a, r);
+            b->df[a][n] = kernel_f64_evaluate_derivative(type, field, a, r);
+            b->de[a][n] = kernel_f64_evaluate_derivative(type, b->e, a, r);
             for (int i = 0; i < 3; i++)
-                b->bend[i][a][n] = kernel_f64_slope_minus_centre(type, b->nonlinear_part[i], a, r);
+                b->bend[i][a][n] = kernel_f64_derivative_minus_centre(type, b->nonlinear_part[i], a, r);
         }
 }
 
@@ -343,11 +344,11 @@ SIMD_INLINE void kernel_bounds_maximize_over_corners(kernel_bounds_lanes *b, int
         }
         const kernel_f64 eighth = kernel_f64_eighth_power_norm((const kernel_f64(*)[3])bend),
                          square = kernel_f64_squared_length(df);
-        theta = n ? kernel_f64_more(eighth, theta) : eighth;
-        slope = n ? kernel_f64_more(square, slope) : square;
-        most_along = n ? kernel_f64_more(along * along, most_along) : along * along;
-        slant = n ? kernel_f64_more(steep, slant) : steep;
-        most_turn = n ? kernel_f64_more(turn, most_turn) : turn;
+        theta = n ? kernel_f64_select_larger(eighth, theta) : eighth;
+        slope = n ? kernel_f64_select_larger(square, slope) : square;
+        most_along = n ? kernel_f64_select_larger(along * along, most_along) : along * along;
+        slant = n ? kernel_f64_select_larger(steep, slant) : steep;
+        most_turn = n ? kernel_f64_select_larger(turn, most_turn) : turn;
     }
     b->theta = kernel_f64_sqrt(kernel_f64_sqrt(kernel_f64_sqrt(theta)));
     b->slope = kernel_f64_rounded(kernel_f64_sqrt(slope));
@@ -363,11 +364,11 @@ SIMD_INLINE void kernel_bounds_store_enclosing_planes(const kernel_bounds_lanes 
                                                       int half, kernel_bounds *out)
 {
     kernel_f64 low = {0}, high = {0};
-    for (int n = 1; n < grid_type_vertices(type); n++) {
+    for (int n = 1; n < grid_type_vertex_count(type); n++) {
         const kernel_f64 at =
             b->inverse[i][0] * b->apart[0][n] + b->inverse[i][1] * b->apart[1][n] + b->inverse[i][2] * b->apart[2][n];
-        low = -kernel_f64_more(-at, -low);
-        high = kernel_f64_more(at, high);
+        low = -kernel_f64_select_larger(-at, -low);
+        high = kernel_f64_select_larger(at, high);
     }
     for (int a = 0; a < 3; a++) kernel_f64_store_half(out->normal[i][a], half, b->inverse[i][a]);
     kernel_f64_store_half(out->low[i], half, low - pad);
@@ -376,7 +377,7 @@ SIMD_INLINE void kernel_bounds_store_enclosing_planes(const kernel_bounds_lanes 
 
 /* Converts the coefficients of a polynomial's nonlinear terms (products of two coordinates, for a hex also of all
  * three) to coordinates that are counted from the domain's middle. */
-SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
+SIMD_INLINE void kernel_f64_shift_terms_to_middle(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
     for (int j = 0; j < 4; j++) out[j] = (kernel_f64){0};
@@ -393,7 +394,7 @@ SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlin
  *
  * y and w have errors of about 4 u |inverse| times `wide` across the ray, and times e along each axis. The rounding of
  * the inverse itself is included. For the first of these two errors the code uses an eighth of the 2e-6 that
- * kernel_f64_bounds() uses for the positions of faces, for the second 3e-7 e.
+ * kernel_f64_compute_bounds() uses for the positions of faces, for the second 3e-7 e.
  *
  * L and E have errors of 4 u times 2, the bound of values (domain_margin has a factor 2 for this), and of 4 u times the
  * gradient, times `wide` across and e along the ray. The rounding of the gradient itself adds as much again: 5e-7 in
@@ -415,8 +416,8 @@ SIMD_INLINE void kernel_bounds_store_iteration_errors(const kernel_bounds_lanes 
                           value = one + (kernel_f64_abs(b->gradient[0]) + kernel_f64_abs(b->gradient[1])) * wide;
     for (int a = 0; a < 3; a++) {
         extent[a] = kernel_f64_abs(b->apart[a][1]);
-        for (int n = 2; n < grid_type_vertices(type); n++)
-            extent[a] = kernel_f64_more(kernel_f64_abs(b->apart[a][n]), extent[a]);
+        for (int n = 2; n < grid_type_vertex_count(type); n++)
+            extent[a] = kernel_f64_select_larger(kernel_f64_abs(b->apart[a][n]), extent[a]);
     }
     for (int i = 0; i < 3; i++) {
         kernel_f64 term = 0.125 * b->across * (kernel_f64_abs(b->inverse[i][0]) + kernel_f64_abs(b->inverse[i][1]));
@@ -435,7 +436,8 @@ SIMD_INLINE void kernel_bounds_store_iteration_errors(const kernel_bounds_lanes 
     kernel_f64_store_half(out->domain_margin, half, domain_margin);
 }
 
-SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int half, kernel_bounds *out, int type)
+SIMD_INLINE void kernel_f64_store_contraction_of_type(const kernel_bounds_lanes *b, int half, kernel_bounds *out,
+                                                      int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
     kernel_f64 middle[4], terms[4];
@@ -451,11 +453,11 @@ SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int hal
         const kernel_f64 offset =
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
         kernel_f64_store_half(out->offset[i], half, offset);
-        kernel_f64_terms_about_middle(type, b->nonlinear_part[i], terms);
+        kernel_f64_shift_terms_to_middle(type, b->nonlinear_part[i], terms);
         for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store_half(out->terms[j][i], half, terms[j]);
     }
     kernel_f64_store_half(out->middle, half, middle[3]);
-    kernel_f64_terms_about_middle(type, b->e + 4, terms);
+    kernel_f64_shift_terms_to_middle(type, b->e + 4, terms);
     for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store_half(out->field_terms[j], half, terms[j]);
     kernel_bounds_store_iteration_errors(b, type, half, out);
 }
@@ -469,8 +471,8 @@ SIMD_INLINE kernel_f64 kernel_f64_bound_squared_hessian(int type, const kernel_f
     kernel_f64 sum = {0};
     if (kernel_has_apex(type)) return c[0] * c[0] * (3.29 * 3.29);
     for (int j = 0; j < 3; j++) {
-        const kernel_f64 largest = kernel_f64_more(kernel_f64_abs(c[j] - KERNEL_DOMAIN_RIM * c[3]),
-                                                   kernel_f64_abs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
+        const kernel_f64 largest = kernel_f64_select_larger(kernel_f64_abs(c[j] - KERNEL_DOMAIN_RIM * c[3]),
+                                                            kernel_f64_abs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
         sum += 2 * largest * largest;
     }
     return sum;
@@ -492,10 +494,10 @@ SIMD_INLINE void kernel_f64_store_search_bounds(const kernel_bounds_lanes *b, in
     kernel_f64_store_half(out->map_curvature, half, kernel_f64_sqrt(twist));
 }
 
-static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, int half, kernel_bounds *out,
-                                                             int type)
+static __attribute__((noinline)) void kernel_f64_store_contraction(const kernel_bounds_lanes *b, int half,
+                                                                   kernel_bounds *out, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, half, out);
+    KERNEL_OF_TYPE(type, kernel_f64_store_contraction_of_type, b, half, out);
 }
 
 /* Computes all members of *out for half of the lanes. beam: bounds of the rays, whose directions are near (0, 0, 1);
@@ -506,13 +508,13 @@ static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds
  * To prove that F is monotone along the rays: with M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, E
  * changes the derivative of L by grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w). Each of the three terms
  * is bounded separately, by its maximum at the corners for the middle ray and by how far another ray's w may differ. */
-SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
-                                   kernel_bounds *out, int type)
+SIMD_INLINE void kernel_f64_compute_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
+                                           kernel_bounds *out, int type)
 {
     const kernel_f64 zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
     kernel_f64 w[3], length = zero, off = zero, gap = zero;
-    kernel_bounds_lanes_fit(&b, type, at, half);
+    kernel_bounds_fit_polynomials(&b, type, at, half);
     kernel_bounds_compute_nonlinear_map(&b, type);
     const kernel_f64 size = kernel_bounds_fit_linear_function(&b, type), *const g = b.gradient;
     kernel_bounds_compute_corner_derivatives(&b, type);
@@ -550,15 +552,15 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
     kernel_f64_store_half(out->level, half, level);
     for (int a = 0; a < 3; a++) kernel_f64_store_half(out->gradient[a], half, g[a]);
     kernel_f64_store_half(out->thickness, half, kernel_f64_select(b.is_regular, thickness, endless));
-    kernel_f64_contraction(&b, half, out, type);
+    kernel_f64_store_contraction(&b, half, out, type);
 }
 
 /* Computes the bounds for one cell of this type per lane, from vertex positions in tile space and vertex values
  * (`at`). */
-static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[4][8][SIMD_WIDTH],
-                                                       const kernel_beam *beam, kernel_bounds *out)
+static __attribute__((noinline)) void kernel_compute_bounds_of_cells(int type, const float at[4][8][SIMD_WIDTH],
+                                                                     const kernel_beam *beam, kernel_bounds *out)
 {
-    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_f64_bounds, at, half, beam, out);
+    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_f64_compute_bounds, at, half, beam, out);
 }
 
 /* Hexes, wedges or pyramids of one type, one per lane, in the form that the search for crossings of the isovalue reads
@@ -576,7 +578,7 @@ typedef struct kernel_curved {
 } kernel_curved;
 
 /* Returns upper bounds of the slopes and origins of the tile's rays in tile space. */
-SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE kernel_beam kernel_bound_rays_of_tile(const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
     const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
@@ -588,9 +590,9 @@ static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const 
                                                                           kernel_curved *out)
 {
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, out->at[n]);
-    kernel_map_spread(c->g, c->count, out->colours);
-    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])out->at, beam, out->bounds);
+    for (int n = 0; n < 4; n++) kernel_broadcast_vertex_numbers(numbers[n], c->count, out->at[n]);
+    kernel_broadcast_vertex_numbers(c->g, c->count, out->colours);
+    kernel_compute_bounds_of_cells(c->type, (const float(*)[8][SIMD_WIDTH])out->at, beam, out->bounds);
     out->type = c->type;
     out->lane = 0;
 }

@@ -88,7 +88,8 @@ typedef struct kernel_tile_position {
 
 /* Returns twice an upper bound of |x| and |y| of a vertex, projected along any of the tile's rays: N of the comment
  * above kernel_line. The error bounds of edge functions are computed from this number. */
-SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile *tile, kernel_tile_position a)
+SIMD_INLINE float kernel_bound_projected_position(const kernel_frame *f, const kernel_tile *tile,
+                                                  kernel_tile_position a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
     const float x = fabsf(a.x), y = fabsf(a.y);
@@ -96,7 +97,7 @@ SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile 
 }
 
 /* Computes the line (the affine edge function) of the edge from a to b, where a is before b in the order of
- * coordinates. size_a, size_b: kernel_position_size() of the vertices. */
+ * coordinates. size_a, size_b: kernel_bound_projected_position() of the vertices. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_position a, kernel_tile_position b,
                                             float size_a, float size_b)
 {
@@ -120,8 +121,8 @@ typedef struct kernel_edge_error {
     float error, extent;
 } kernel_edge_error;
 
-SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radius, kernel_tile_position a,
-                                                kernel_tile_position b)
+SIMD_INLINE kernel_edge_error kernel_compute_edge_error(const kernel_line *l, float radius, kernel_tile_position a,
+                                                        kernel_tile_position b)
 {
     const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
     return (kernel_edge_error){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
@@ -132,7 +133,7 @@ SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radi
  * KERNEL_WEIGHT_ERROR. The comment above kernel_line derives it, and calls the sum A. errors, extents: sums over the
  * triangle's three edges (kernel_edge_error). Along any axis the edges' extents sum to twice the triangle's extent,
  * hence the factor 1/2. */
-SIMD_INLINE float kernel_least_weight(float errors, float extents)
+SIMD_INLINE float kernel_compute_least_weight_sum(float errors, float extents)
 {
     return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
 }
@@ -143,11 +144,11 @@ SIMD_INLINE kernel_edge_error kernel_edge_error_max(kernel_edge_error a, kernel_
     return (kernel_edge_error){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
 }
 
-/* Returns an upper bound of kernel_least_weight() for all triangles whose edges have at most the error most.error and
- * the extent most.extent. */
-SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
+/* Returns an upper bound of kernel_compute_least_weight_sum() for all triangles whose edges have at most the error
+ * most.error and the extent most.extent. */
+SIMD_INLINE float kernel_bound_least_weight_sum(kernel_edge_error most)
 {
-    return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
+    return 1.0001f * kernel_compute_least_weight_sum(3 * most.error, 3 * most.extent);
 }
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
@@ -175,7 +176,7 @@ typedef struct kernel_cell {
     /* lines (kernel_line) of the edges, then of the quads' diagonals; not computed for tets */
     kernel_line lines[KERNEL_MAX_LINES];
     /* if the sum of a crossing's weights is at least this, the crossing is accurate, whichever of the cell's triangles
-     * is crossed (kernel_least_weight_bound()) */
+     * is crossed (kernel_bound_least_weight_sum()) */
     float least;
 } kernel_cell;
 
@@ -214,13 +215,13 @@ static inline double kernel_cell_size(const double (*world)[3], int count)
 
 /* Adds those of a face's vertices that are missing to the list `vertices`. Returns a mask of the indices that the
  * face's vertices have in this list. Returns 0 if the list would exceed four vertices. */
-static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
+static int kernel_add_face_vertices(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
     int64_t first, end;
     int corners = 0;
     grid_face_vertices(g, face, &first, &end);
     for (int64_t i = first; i < end; i++) {
-        const int64_t vertex = grid_array_index(&g->face_connectivity, i);
+        const int64_t vertex = grid_read_index(&g->face_connectivity, i);
         int at = 0;
         while (at < *count && vertices[at] != vertex) at++;
         if (at == 4) return 0;
@@ -240,7 +241,7 @@ static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
     int count = 0, lacking = 0;
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) {
-        const int corners = kernel_face_corners(g, grid_array_index(&g->connectivity, i), vertices, &count);
+        const int corners = kernel_add_face_vertices(g, grid_read_index(&g->connectivity, i), vertices, &count);
         if (corners && !(corners & (corners - 1))) continue;
         const int lack = ~corners & 15;
         if (!corners || !lack || (lack & (lack - 1)) || (lacking & lack)) return false;
@@ -351,7 +352,7 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
  * lexicographic order of coordinates. In other cells, ranks are computed, and the vertices are put in the order of
  * kernel_cell_canonical_order(). So no result depends on how the simulation numbers a cell's vertices, not even if the
  * cell's map is folded, so that a point has several reference coordinates. */
-static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
+static __attribute__((noinline, unused)) void kernel_cell_sort_vertices(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
     if (kernel_is_linear(c->type)) {
@@ -397,7 +398,7 @@ SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_ti
 static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(kernel_cell *c, const kernel_frame *f,
                                                                              const kernel_tile *tile, const grid *g)
 {
-    for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
+    for (int i = 0; i < c->count; i++) grid_read_vertex_position(g, c->vertices[i], c->world[i]);
     for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_transformed = true;
     c->has_lines = false;
@@ -407,7 +408,7 @@ SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_fram
                                                const grid *g)
 {
     kernel_cell_move_to_tile_space(c, f, tile, g);
-    kernel_cell_order(c);
+    kernel_cell_sort_vertices(c);
 }
 
 SIMD_INLINE kernel_tile_position kernel_cell_position(const kernel_cell *c, int i)
@@ -459,18 +460,18 @@ static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, co
         ends[shape->edge_count + face][0] = (signed char)corner[0];
         ends[shape->edge_count + face][1] = (signed char)corner[2];
     }
-    for (int i = 0; i < c->count; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
+    for (int i = 0; i < c->count; i++) size[i] = kernel_bound_projected_position(f, tile, kernel_cell_position(c, i));
     kernel_edge_error most = {0, 0};
     for (int n = 0; n < count; n++) {
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
         const kernel_tile_position from = kernel_cell_position(c, a), to = kernel_cell_position(c, b);
         c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
         if (kernel_has_triangles(c->type))
-            most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));
+            most = kernel_edge_error_max(most, kernel_compute_edge_error(&c->lines[n], tile->radius, from, to));
     }
     /* A hex has triangles only if a quad has collapsed. For such a rare triangle, infinity makes
      * kernel_weights_recompute() always compute the least sum of weights for the triangle itself. */
-    c->least = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
+    c->least = kernel_is_box(c->type) ? (float)INFINITY : kernel_bound_least_weight_sum(most);
 }
 
 #endif

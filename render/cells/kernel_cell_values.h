@@ -25,7 +25,7 @@ SIMD_INLINE bool kernel_values_straddle(const double *values, int count, double 
 
 /* Returns a power of two by which `largest` (>= 0) is multiplied to bring it near 1. The exponent of the result is
  * minus that of `largest`, limited so that the result is a normal number. */
-SIMD_INLINE double kernel_mirrored_power(double largest)
+SIMD_INLINE double kernel_compute_normalizing_power(double largest)
 {
     uint64_t bits;
     memcpy(&bits, &largest, sizeof bits);
@@ -46,7 +46,7 @@ SIMD_INLINE double kernel_values_subtract_isovalue(const double *values, int cou
         const double size = fabs(values[i] - isovalue);
         largest = size > largest ? size : largest;
     }
-    const double scale = kernel_mirrored_power(largest);
+    const double scale = kernel_compute_normalizing_power(largest);
     for (int i = 0; i < count; i++) out[i] = (float)((values[i] - isovalue) * scale);
     return scale;
 }

@@ -16,8 +16,8 @@
 
 SIMD_INLINE kernel_line kernel_line_in_packet(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
 {
-    return kernel_line_between(p->frame, a, b, kernel_position_size(p->frame, p->tile, a),
-                               kernel_position_size(p->frame, p->tile, b));
+    return kernel_line_between(p->frame, a, b, kernel_bound_projected_position(p->frame, p->tile, a),
+                               kernel_bound_projected_position(p->frame, p->tile, b));
 }
 
 SIMD_INLINE vf kernel_project_x(const kernel_packet *p, kernel_tile_position a)
@@ -52,7 +52,7 @@ static __attribute__((noinline, cold)) vf kernel_decide_edge_ties(vf ax, vf ay, 
  * isovalue where the ray enters and leaves a cell. If the surface consists of faces of cells (is_of_faces of render.h)
  * and a ray meets such a face only in an edge, v_in and v_out are both 0. For such a ray, a number slightly below 0 is
  * returned, as inside the cell, so that the ray crosses the surface. */
-SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
+SIMD_INLINE vf kernel_move_end_value_into_cell(vf v_in, vf v_out, bool is_of_faces)
 {
     if (!is_of_faces) return v_out;
     const vm is_edge = vm_and(vf_eq(v_in, vf_set(0)), vf_eq(v_out, vf_set(0)));
@@ -61,26 +61,29 @@ SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
 
 /* Returns the edge function of the edge from a to b, given by x and y of the two projected points; its sign is exact
  * for these points. */
-SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
+SIMD_INLINE vf kernel_compute_exact_edge_function(vf ax, vf ay, vf bx, vf by)
 {
     const vf e = vf_diff_of_products(ax, by, bx, ay);
     const vm tie = vf_le(vf_abs(e), vf_set(KERNEL_EDGE_LEAST));
     return __builtin_expect(vm_any(tie), 0) ? kernel_decide_edge_ties(ax, ay, bx, by, e) : e;
 }
 
-SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
+SIMD_INLINE vf kernel_compute_projected_edge_function(const kernel_packet *p, kernel_tile_position a,
+                                                      kernel_tile_position b)
 {
-    return kernel_edge_between(kernel_project_x(p, a), kernel_project_y(p, a), kernel_project_x(p, b),
-                               kernel_project_y(p, b));
+    return kernel_compute_exact_edge_function(kernel_project_x(p, a), kernel_project_y(p, a), kernel_project_x(p, b),
+                                              kernel_project_y(p, b));
 }
 
-static __attribute__((noinline, cold)) vf kernel_edge_recomputed(const kernel_packet *p, kernel_tile_position a,
-                                                                 kernel_tile_position b, vm doubt, vf e)
+static __attribute__((noinline, cold)) vf kernel_recompute_uncertain_edge_function(const kernel_packet *p,
+                                                                                   kernel_tile_position a,
+                                                                                   kernel_tile_position b, vm doubt,
+                                                                                   vf e)
 {
-    return vf_select(doubt, kernel_edge_projected(p, a, b), e);
+    return vf_select(doubt, kernel_compute_projected_edge_function(p, a, b), e);
 }
 
-SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
+SIMD_INLINE vf kernel_evaluate_line_on_rays(const kernel_packet *p, const kernel_line *l)
 {
     return vf_muladd(vf_set(l->cv), p->v, vf_muladd(vf_set(l->cu), p->u, vf_set(l->c)));
 }
@@ -91,10 +94,10 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
 SIMD_INLINE vf kernel_edge_function_on_rays(const kernel_packet *p, const kernel_line *l, kernel_tile_position a,
                                             kernel_tile_position b)
 {
-    if (!p->is_pencil) return kernel_edge_projected(p, a, b);
-    const vf e = kernel_line_at(p, l);
+    if (!p->is_pencil) return kernel_compute_projected_edge_function(p, a, b);
+    const vf e = kernel_evaluate_line_on_rays(p, l);
     const vm doubt = vm_not(vf_lt(vf_set(l->bound), vf_abs(e)));
-    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_recomputed(p, a, b, doubt, e) : e;
+    return __builtin_expect(vm_any(doubt), 0) ? kernel_recompute_uncertain_edge_function(p, a, b, doubt, e) : e;
 }
 
 /* Returns those of the given rays that cross the triangle with the vertices i, j, k. ij, jk, ik: the rays' edge
@@ -108,7 +111,7 @@ SIMD_INLINE vm kernel_rays_inside_triangle(vm rays, vf ij, vf jk, vf ik)
 /* Returns the weighted sum of a quantity (depth or field) over the vertices of a crossed triangle. i, j, k: the
  * quantity at the vertices; ij, jk, ik: the edge functions, which give the weights (kernel_cell.h). Divided by
  * kernel_sum_weights() it is the quantity at the crossing. */
-SIMD_INLINE vf kernel_weighted_value(vf ij, vf jk, vf ik, float i, float j, float k)
+SIMD_INLINE vf kernel_sum_weighted_vertex_values(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
 }
@@ -122,11 +125,11 @@ SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, 
                                                         kernel_tile_position b)
 {
     const kernel_line l = kernel_line_in_packet(p, a, b);
-    return kernel_line_error(&l, p->tile->radius, a, b);
+    return kernel_compute_edge_error(&l, p->tile->radius, a, b);
 }
 
-/* Returns the least sum of weights at which crossings of the triangle i, j, k are accurate (kernel_least_weight()). The
- * vertices must be in the order of coordinates. */
+/* Returns the least sum of weights at which crossings of the triangle i, j, k are accurate
+ * (kernel_compute_least_weight_sum()). The vertices must be in the order of coordinates. */
 static __attribute__((noinline, cold)) float kernel_compute_triangle_least_weight(const kernel_packet *p,
                                                                                   kernel_tile_position i,
                                                                                   kernel_tile_position j,
@@ -134,27 +137,28 @@ static __attribute__((noinline, cold)) float kernel_compute_triangle_least_weigh
 {
     const kernel_edge_error ij = kernel_edge_error_between(p, i, j), jk = kernel_edge_error_between(p, j, k),
                             ik = kernel_edge_error_between(p, i, k);
-    return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
+    return kernel_compute_least_weight_sum((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
 /* Returns the rays whose crossing of a triangle is not accurate enough, because the sum of its weights (`weight`) has a
  * magnitude below `least`. hit: the rays that cross the triangle. */
-SIMD_INLINE vm kernel_is_inaccurate(vm hit, vf weight, float least)
+SIMD_INLINE vm kernel_find_inaccurate_crossings(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
 /* Replaces the triangle's edge functions on the rays in `weak` by those computed from its projected vertices. ijk: the
  * vertices in the order of coordinates. */
-static __attribute__((noinline, cold)) void
-kernel_triangle_recompute(const kernel_packet *p, const kernel_tile_position ijk[3], vm weak, vf *ij, vf *jk, vf *ik)
+static __attribute__((noinline, cold)) void kernel_recompute_triangle_edge_functions(const kernel_packet *p,
+                                                                                     const kernel_tile_position ijk[3],
+                                                                                     vm weak, vf *ij, vf *jk, vf *ik)
 {
     const vf ax = kernel_project_x(p, ijk[0]), ay = kernel_project_y(p, ijk[0]);
     const vf bx = kernel_project_x(p, ijk[1]), by = kernel_project_y(p, ijk[1]);
     const vf cx = kernel_project_x(p, ijk[2]), cy = kernel_project_y(p, ijk[2]);
-    *ij = vf_select(weak, kernel_edge_between(ax, ay, bx, by), *ij);
-    *jk = vf_select(weak, kernel_edge_between(bx, by, cx, cy), *jk);
-    *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);
+    *ij = vf_select(weak, kernel_compute_exact_edge_function(ax, ay, bx, by), *ij);
+    *jk = vf_select(weak, kernel_compute_exact_edge_function(bx, by, cx, cy), *jk);
+    *ik = vf_select(weak, kernel_compute_exact_edge_function(ax, ay, cx, cy), *ik);
 }
 
 SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
@@ -186,17 +190,17 @@ SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, v
 {
     if (!p->is_pencil) return;
     const vf weight = kernel_sum_weights(w->ij, w->jk, w->ik);
-    if (__builtin_expect(!vm_any(kernel_is_inaccurate(hit, weight, least)), 1)) return;
-    const vm weak = kernel_is_inaccurate(hit, weight, kernel_compute_triangle_least_weight(p, i, j, k));
+    if (__builtin_expect(!vm_any(kernel_find_inaccurate_crossings(hit, weight, least)), 1)) return;
+    const vm weak = kernel_find_inaccurate_crossings(hit, weight, kernel_compute_triangle_least_weight(p, i, j, k));
     vf ij = w->ij, jk = w->jk, ik = w->ik;
     if (!vm_any(weak)) return;
-    kernel_triangle_recompute(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);
+    kernel_recompute_triangle_edge_functions(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);
     *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
 }
 
 SIMD_INLINE vf kernel_weighted_sum(const kernel_weights *w, float fi, float fj, float fk)
 {
-    return kernel_weighted_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
+    return kernel_sum_weighted_vertex_values(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
 }
 
 SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
@@ -218,7 +222,7 @@ typedef struct kernel_face_search {
 
 /* Computes the rays' edge function of the edge between the vertices i and j, and stores it in s->edge. n: index of the
  * edge in cell->lines. i and j may be given in any order. */
-SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
+SIMD_INLINE void kernel_store_edge_function(kernel_face_search *s, int n, int i, int j)
 {
     const kernel_cell *c = s->cell;
     const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
@@ -226,7 +230,8 @@ SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
         kernel_edge_function_on_rays(s->packet, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
 }
 
-SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_point *out)
+SIMD_INLINE void kernel_set_values_at_triangle_crossing(const kernel_face_search *s, const kernel_weights *w,
+                                                        kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
@@ -237,7 +242,7 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
 
 /* Returns the edge function of the edge from one vertex to another. The function is stored for the direction in which
  * coordinates increase, and is negated for the other direction. */
-SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
+SIMD_INLINE vf kernel_get_directed_edge_function(const kernel_face_search *s, int from, int to)
 {
     return s->cell->rank[from] < s->cell->rank[to] ? s->edge[from][to] : -s->edge[to][from];
 }
@@ -245,8 +250,8 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 /* Computes the field and the cell's reference coordinates at a crossing of a quad's bilinear patch. corner: the quad's
  * vertices; at->r[0], at->r[1]: the patch's parameters at the crossing (kernel_quad.h). The isoparametric maps of both
  * cells that share the quad map their faces to this patch, so the field is continuous across the face. */
-SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_point *at,
-                                    kernel_point *out)
+SIMD_INLINE void kernel_set_values_at_quad_crossing(const kernel_face_search *s, const int corner[4],
+                                                    const kernel_point *at, kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
@@ -263,7 +268,7 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
 }
 
 /* Sorts three of the cell's vertices by their ranks in the lexicographic order of coordinates. */
-SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3], int out[3])
+SIMD_INLINE void kernel_sort_triangle_vertices(const kernel_cell *c, const int corners[3], int out[3])
 {
     int i = corners[0], j = corners[1], k = corners[2], swap;
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
@@ -287,7 +292,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
 {
     const kernel_cell *c = s->cell;
     int ijk[3];
-    kernel_triangle_order(c, corners, ijk);
+    kernel_sort_triangle_vertices(c, corners, ijk);
     const vm hit = kernel_rays_crossing_triangle(s, ijk);
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]],
@@ -296,14 +301,14 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
                              kernel_cell_position(c, w.k), &w);
     out->mask = hit;
     out->t = kernel_weighted_depth(&w, c->z);
-    kernel_triangle_values(s, &w, out);
+    kernel_set_values_at_triangle_crossing(s, &w, out);
     return true;
 }
 
 /* Computes the crossings of a quad that has collapsed to a triangle, as crossings of the two triangles into which its
  * diagonal splits it. Returns how many entries of `out` are set. */
-static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
-                                                                      kernel_point *out)
+static __attribute__((noinline, cold)) int kernel_cross_collapsed_quad(const kernel_face_search *s, const int corner[4],
+                                                                       kernel_point *out)
 {
     int n = 0;
     for (int half = 0; half < 2; half++) {
@@ -324,23 +329,23 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     for (int half = 0; half < 2; half++) {
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
         int ijk[3];
-        kernel_triangle_order(c, corners, ijk);
+        kernel_sort_triangle_vertices(c, corners, ijk);
         once = vm_xor(once, kernel_rays_crossing_triangle(s, ijk));
     }
     quad.e01 = s->edge[corner[0]][corner[1]];
     quad.e03 = s->edge[corner[0]][corner[3]];
-    quad.e12 = kernel_corner_edge(s, corner[1], corner[2]);
-    quad.e32 = kernel_corner_edge(s, corner[3], corner[2]);
+    quad.e12 = kernel_get_directed_edge_function(s, corner[1], corner[2]);
+    quad.e32 = kernel_get_directed_edge_function(s, corner[3], corner[2]);
     const vm twice = kernel_quad_sides_allow_two_points(s->rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
-    if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
+    if (kernel_quad_collapses(c, corner)) return kernel_cross_collapsed_quad(s, corner, out);
     for (int i = 0; i < 4; i++) {
         quad.x[i] = s->x[corner[i]];
         quad.y[i] = s->y[corner[i]];
         quad.z[i] = vf_set(c->z[corner[i]]);
     }
     const int n = kernel_compute_quad_points(&quad, once, twice, places);
-    for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
+    for (int i = 0; i < n; i++) kernel_set_values_at_quad_crossing(s, corner, &places[i], &out[i]);
     return n;
 }
 
@@ -359,7 +364,8 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
         s.x[i] = kernel_project_x(p, kernel_cell_position(c, i));
         s.y[i] = kernel_project_y(p, kernel_cell_position(c, i));
     }
-    for (int n = 0; n < shape->edge_count; n++) kernel_curved_edge(&s, n, shape->edges[n][0], shape->edges[n][1]);
+    for (int n = 0; n < shape->edge_count; n++)
+        kernel_store_edge_function(&s, n, shape->edges[n][0], shape->edges[n][1]);
     int n = 0;
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
@@ -370,7 +376,7 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
-        kernel_curved_edge(&s, shape->edge_count + face, corner[0], corner[2]);
+        kernel_store_edge_function(&s, shape->edge_count + face, corner[0], corner[2]);
         n += kernel_quad_crossings(&s, corner, &out[n]);
     }
     return n;
@@ -378,7 +384,7 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
 
 /* Removes the nearest crossing of each ray from the list and stores it in *out. Returns false if the list has no
  * crossing of any ray. */
-SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point *out)
+SIMD_INLINE bool kernel_take_nearest_crossing(kernel_point *list, int count, kernel_point *out)
 {
     vi taken = vi_set(-1);
     out->mask = vm_none();
@@ -417,8 +423,8 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
     kernel_point list[KERNEL_MAX_CROSSINGS], in, next;
     const int crossings = kernel_curved_crossings(p, c, rays, list);
     int n = 0;
-    while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
-           kernel_take_nearest(list, crossings, &next)) {
+    while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest_crossing(list, crossings, &in) &&
+           kernel_take_nearest_crossing(list, crossings, &next)) {
         kernel_interval_from_points(vm_and(in.mask, next.mask), &in, &next, &out[n]);
         n++;
     }

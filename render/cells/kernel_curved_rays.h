@@ -18,7 +18,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
+SIMD_INLINE void kernel_pixel_list_copy_ray(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
 {
     to->pixel[to->count] = from->pixel[i];
     to->lane[to->count] = from->lane[i];
@@ -48,7 +48,7 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
     vm side[4];
     for (int i = 0; i < 4; i++) side[i] = vm_sign(around[i]);
     *alone = vm_or(*alone, kernel_curved_may_cross_twice(x, y, loop, rays, side));
-    return kernel_cross_one_triangle(side, vm_sign(diagonal));
+    return kernel_find_rays_crossing_one_triangle(side, vm_sign(diagonal));
 }
 
 /* Finds the rays that cross exactly two faces of their cells, each once (*two), and the indices of these faces in the
@@ -63,7 +63,7 @@ SIMD_INLINE void kernel_curved_find_crossed_faces(const float (*at)[8][SIMD_WIDT
     const kernel_shape *shape = kernel_cell_shape(type);
     vf x[8], y[8], least = vf_set(INFINITY);
     vi side[KERNEL_MAX_LINES], faces = vi_set(0);
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         const vf z = kernel_gather_lane(at[2][i], r->lane);
         x[i] = (kernel_gather_lane(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
         y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
@@ -83,7 +83,7 @@ SIMD_INLINE void kernel_curved_find_crossed_faces(const float (*at)[8][SIMD_WIDT
             const signed char *edge = shape->faces[n].sides[i];
             around[i] = edge[1] ? ~side[(int)edge[0]] : side[(int)edge[0]];
         }
-        vi crossed = kernel_sides_agree(around, shape->faces[n].count) >> (31 - n) & bit;
+        vi crossed = kernel_are_on_same_side_of_edges(around, shape->faces[n].count) >> (31 - n) & bit;
         if (nonconvex && shape->faces[n].count == 4 && vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - n))))) {
             const vm once = kernel_curved_cross_one_triangle(x, y, shape->faces[n].vertices, around,
                                                              side[shape->edge_count + n], rays, alone);
@@ -94,8 +94,8 @@ SIMD_INLINE void kernel_curved_find_crossed_faces(const float (*at)[8][SIMD_WIDT
     kernel_curved_find_two_faces(faces, rays, two, alone, face);
 }
 
-SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vm *two,
-                                     vm *alone, vi face[2])
+SIMD_INLINE void kernel_curved_find_faces_of_active_rays(const kernel_transformed_curved *h, const kernel_lane_rays *p,
+                                                         int type, vm *two, vm *alone, vi face[2])
 {
     const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
     kernel_curved_find_crossed_faces((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, two, alone, face, type);
@@ -128,13 +128,14 @@ SIMD_INLINE void kernel_curved_corners_gather(const kernel_transformed_curved *h
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++)
-            out->at[i][n] = kernel_curved_gather_vertex(h->at[n], grid_type_vertices(type), p->lane, out->vertex[i]);
+            out->at[i][n] =
+                kernel_curved_gather_vertex(h->at[n], grid_type_vertex_count(type), p->lane, out->vertex[i]);
     }
     kernel_curved_corners_project(&p->rays, out);
 }
 
-SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_point *place,
-                                          kernel_point *out)
+SIMD_INLINE void kernel_set_crossing_from_patch_point(int type, const kernel_curved_corners *c,
+                                                      const kernel_point *place, kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
@@ -142,13 +143,14 @@ SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners 
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
+            at[i] =
+                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertex_count(type), a, c->vertex[i]);
         out->r[a] = (at[0] + place->r[0] * (at[1] - at[0])) + place->r[1] * (at[3] - at[0]);
     }
 }
 
 /* Computes the edge functions ij, jk and ik of triangles from their projected corners. */
-SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf e[3])
+SIMD_INLINE void kernel_compute_corner_edge_functions(const kernel_curved_corners *c, vf e[3])
 {
     const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
     e[0] = vf_diff_of_products(i[0], j[1], j[0], i[1]);
@@ -158,8 +160,8 @@ SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf
 
 /* Returns the rays on which the sum of the triangle's weights is too small for an accurate crossing. number: index of
  * each ray's triangle among its cell's triangles; e: edge functions ij, jk, ik. */
-SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
-                                                 const vf e[3])
+SIMD_INLINE vm kernel_find_inaccurate_triangle_rays(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
+                                                    const vf e[3])
 {
     return vm_and(
         rays, vf_lt(vf_abs(kernel_sum_weights(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
@@ -168,23 +170,22 @@ SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved
 /* Replaces edge functions by more accurate ones, which are computed from the projected corners. This is done for each
  * edge function whose sign is uncertain (doubt), and for all three of a triangle whose weights are not accurate
  * enough. */
-static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
-                                                                             vi lane, vm rays, vi number,
-                                                                             const vm doubt[3],
-                                                                             const kernel_curved_corners *c, vf e[3])
+static __attribute__((noinline, cold)) void
+kernel_replace_inaccurate_edge_functions(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
+                                         const vm doubt[3], const kernel_curved_corners *c, vf e[3])
 {
     vf exact[3];
-    kernel_curved_triangle_edges(c, exact);
+    kernel_compute_corner_edge_functions(c, exact);
     for (int i = 0; i < 3; i++) e[i] = vf_select(doubt[i], exact[i], e[i]);
-    const vm weak = kernel_curved_triangle_inaccurate(h, lane, rays, number, e);
+    const vm weak = kernel_find_inaccurate_triangle_rays(h, lane, rays, number, e);
     for (int i = 0; i < 3; i++) e[i] = vf_select(weak, exact[i], e[i]);
 }
 
 /* Computes the edge functions ij, jk and ik of a triangular face of each ray's cell, for the given rays, from the lines
  * that h holds (kernel_transformed_curved.triangles). face: index of the face in the cell. Lanes of other rays get
  * meaningless numbers. */
-SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                              vm rays, vi face, const kernel_curved_corners *c, vf e[3])
+SIMD_INLINE void kernel_evaluate_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                                vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
     const int size = (int)(sizeof h->triangles[0] / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
@@ -196,8 +197,9 @@ SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h
         doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines[3][i], at), vf_abs(e[i])));
         any = vm_or(any, doubt[i]);
     }
-    any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, e));
-    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p->lane, rays, number, doubt, c, e);
+    any = vm_or(any, kernel_find_inaccurate_triangle_rays(h, p->lane, rays, number, e));
+    if (__builtin_expect(vm_any(any), 0))
+        kernel_replace_inaccurate_edge_functions(h, p->lane, rays, number, doubt, c, e);
 }
 
 /* Computes the crossings of triangles. Depth, field and reference coordinates of a crossing are means of those at the
@@ -212,7 +214,7 @@ SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corn
         v[1][i] = c->at[i][3];
         for (int a = 0; a < 3; a++)
             v[2 + a][i] =
-                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
+                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertex_count(type), a, c->vertex[i]);
     }
     for (int n = 0; n < 5; n++) v[n][0] = vf_muladd(e[0], v[n][2], vf_muladd(-e[2], v[n][1], e[1] * v[n][0])) * inverse;
     *out = (kernel_point){.t = v[0][0], .value = v[1][0], .r = {v[2][0], v[3][0], v[4][0]}};
@@ -227,7 +229,7 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
 {
     const int quads = kernel_has_apex(type) ? 1 : 2;
     vm on_quad[2];
-    for (int n = 0; n < 2; n++) on_quad[n] = vm_and(active, kernel_curved_on_quad(type, n, face[n]));
+    for (int n = 0; n < 2; n++) on_quad[n] = vm_and(active, kernel_is_crossed_face_a_quad(type, n, face[n]));
     if (kernel_has_triangles(type)) memset(out, 0, 2 * sizeof *out);
     if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1]))) {
         kernel_quad quad[2];
@@ -241,7 +243,7 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
         /* none of the active rays meets an edge, because kernel_curved_find_crossed_faces() adds rays that may meet one
          * to its mask `alone` */
         kernel_quads_cross(quad, quads, on_quad, true, places);
-        for (int n = 0; n < quads; n++) kernel_curved_quad_point(type, &corners[n], &places[n], &out[n]);
+        for (int n = 0; n < quads; n++) kernel_set_crossing_from_patch_point(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(active, on_quad[n]);
@@ -249,9 +251,9 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
         vf e[3];
         if (!vm_any(on_triangle)) continue;
         if (h)
-            kernel_curved_triangle_lines(h, p, type, on_triangle, face[n], &corners[n], e);
+            kernel_evaluate_triangle_lines(h, p, type, on_triangle, face[n], &corners[n], e);
         else
-            kernel_curved_triangle_edges(&corners[n], e);
+            kernel_compute_corner_edge_functions(&corners[n], e);
         kernel_curved_triangle_point(type, &corners[n], e, &place);
         kernel_point_copy_lanes(on_triangle, &place, &out[n]);
     }
@@ -273,8 +275,9 @@ SIMD_INLINE void kernel_curved_compute_crossings(const kernel_transformed_curved
  * `bits`. ends[e]: crossing e of these SIMD_WIDTH rays with their cells, one ray per lane, for e < end_count. Depth,
  * value and reference coordinates of an appended ray's crossing e are stored in out[e][0] to out[e][4], at the ray's
  * index in `rays`. */
-SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
-                                        unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
+SIMD_INLINE void kernel_append_rays_with_crossings(const kernel_pixel_list *met, int n, const kernel_point *ends,
+                                                   int end_count, unsigned bits, kernel_pixel_list *rays,
+                                                   float (*out)[5][KERNEL_LIST_ROOM])
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
@@ -287,11 +290,12 @@ SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, con
         const int i = __builtin_ctz(bits), to = rays->count;
         for (int e = 0; e < end_count; e++)
             for (int k = 0; k < 5; k++) out[e][k][to] = lanes[e][k][i];
-        kernel_curved_ray_add(rays, met, n + i);
+        kernel_pixel_list_copy_ray(rays, met, n + i);
     }
 }
 
-/* Loads the crossings, stored by kernel_curved_ends_add(), of the SIMD_WIDTH rays from index n on in the list. */
+/* Loads the crossings, stored by kernel_append_rays_with_crossings(), of the SIMD_WIDTH rays from index n on in the
+ * list. */
 SIMD_INLINE void kernel_curved_ends_load(float (*const ends)[5][KERNEL_LIST_ROOM], int n, int end_count,
                                          kernel_point *out)
 {

@@ -85,7 +85,7 @@ SIMD_INLINE void kernel_lanes_subtract_isovalues(const kernel_f64 (*values)[2], 
 
 /* Returns, for one vertex per lane, twice an upper bound of |x| and |y| of the vertex, projected along any of the
  * tile's rays (N of kernel_cell.h). */
-SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
+SIMD_INLINE vf kernel_lanes_bound_projected_position(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
 {
     vf depth = vf_set(1);
     if (!f->job->camera.is_orthographic) depth = vf_abs(at[2]) + fabsf((float)f->depth_shift);
@@ -93,8 +93,8 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
 }
 
 /* Returns the magnitude above which the sign of an edge's affine edge function is certain (kernel_line.bound). size_a,
- * size_b: kernel_lanes_size() of the vertices. */
-SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
+ * size_b: kernel_lanes_bound_projected_position() of the vertices. */
+SIMD_INLINE vf kernel_lanes_bound_edge_function_error(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);
 }
@@ -117,8 +117,8 @@ SIMD_INLINE void kernel_lanes_edge_function(const kernel_frame *f, const vf a[3]
 
 /* Computes the largest error of the edge function and the edge's extent (kernel_edge_error). line: c, cu and cv of the
  * edge function; radius: kernel_tile.radius. */
-SIMD_INLINE void kernel_lanes_edge_extent(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
-                                          vf *extent)
+SIMD_INLINE void kernel_lanes_compute_error_and_extent(const vf line[3], float radius, const vf a[3], const vf b[3],
+                                                       vf *error, vf *extent)
 {
     vf apart[3];
     for (int i = 0; i < 3; i++) apart[i] = vf_abs(a[i] - b[i]);

@@ -58,7 +58,7 @@ SIMD_INLINE int kernel_nonlinear_count(int type)
 /* Computes the polynomial coefficients of the field, or of one coordinate, from its values v at a hex's vertices. out:
  * the value at the middle, then the coefficients of the three linear terms, then those of the nonlinear terms. The
  * functions below do the same for other types. */
-SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
+SIMD_INLINE void kernel_fit_hex_polynomial(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
     const vf m0 = v[1] - v[0], m1 = v[2] - v[3], m2 = v[5] - v[4], m3 = v[6] - v[7];
@@ -74,7 +74,7 @@ SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
     out[7] = mm1 - mm0;
 }
 
-SIMD_INLINE void kernel_wedge_terms(const vf v[6], vf out[8])
+SIMD_INLINE void kernel_fit_wedge_polynomial(const vf v[6], vf out[8])
 {
     const vf low = (v[0] + v[1]) + v[2], high = (v[3] + v[4]) + v[5];
     out[0] = (low + high) * (1.0f / 6);
@@ -85,7 +85,7 @@ SIMD_INLINE void kernel_wedge_terms(const vf v[6], vf out[8])
     out[5] = (v[5] - v[3]) - (v[2] - v[0]);
 }
 
-SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
+SIMD_INLINE void kernel_fit_pyramid_polynomial(const vf v[5], vf out[8])
 {
     const vf along = v[1] - v[0], across = v[3] - v[0], nonlinear_part = (v[0] - v[1]) + (v[2] - v[3]);
     out[0] = v[4];
@@ -98,11 +98,11 @@ SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
 SIMD_INLINE void kernel_local_fit_polynomial(int type, const vf *v, vf out[8])
 {
     if (kernel_is_box(type))
-        kernel_hex_terms(v, out);
+        kernel_fit_hex_polynomial(v, out);
     else if (kernel_is_prism(type))
-        kernel_wedge_terms(v, out);
+        kernel_fit_wedge_polynomial(v, out);
     else
-        kernel_pyramid_terms(v, out);
+        kernel_fit_pyramid_polynomial(v, out);
 }
 
 /* Computes the products of reference coordinates that are the nonlinear terms of a cell's map. term[k]: product k at r;
@@ -136,7 +136,7 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], vf term[KERN
 
 /* Converts reference coordinates r from those of kernel_map.h, which are counted from a corner, to those of this file,
  * which are counted from the middle. */
-SIMD_INLINE void kernel_local_of_reference(int type, vf r[3])
+SIMD_INLINE void kernel_local_shift_reference_origin(int type, vf r[3])
 {
     vf middle = vf_set(kernel_is_box(type) ? 0.5f : 1.0f / 3);
     if (kernel_has_apex(type)) middle = 0.5f * r[2];
@@ -161,7 +161,7 @@ SIMD_INLINE vf kernel_local_border_distance(int type, const vf r[3])
 
 /* Returns an upper bound, over the cell, of the squared Frobenius norm of the derivative of n, the nonlinear part of
  * the cell's map. For hexes and wedges it is the maximum at the corners. */
-SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
+SIMD_INLINE vf kernel_local_bound_nonlinearity(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
                                             {0.5f, -0.5f, -0.5f},
@@ -257,7 +257,7 @@ SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], cons
 SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const vf values[8], float most_bent,
                                          kernel_local_cells *out)
 {
-    const int count = grid_type_vertices(type), bends = kernel_nonlinear_count(type);
+    const int count = grid_type_vertex_count(type), bends = kernel_nonlinear_count(type);
     vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
@@ -280,7 +280,7 @@ SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const 
     kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
     kernel_local_affine_bounds(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
-    const vf bend = kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part);
+    const vf bend = kernel_local_bound_nonlinearity(type, (const vf(*)[3])nonlinear_part);
     vf_store(out->bend, bend);
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
@@ -309,7 +309,7 @@ SIMD_INLINE void kernel_local_newton_residual(int type, const kernel_local_point
     }
 }
 
-SIMD_INLINE void kernel_local_derivatives(int type, kernel_local_points *p)
+SIMD_INLINE void kernel_local_compute_inverse_jacobian(int type, kernel_local_points *p)
 {
     /* derivatives of r + n(r) along each component of the reference coordinates r, where n is the map's nonlinear
      * part */
@@ -332,7 +332,8 @@ SIMD_INLINE void kernel_local_derivatives(int type, kernel_local_points *p)
 }
 
 /* Does a step of Newton's method in the given lanes, with the derivatives that the last call of
- * kernel_local_derivatives() computed. Returns the magnitude of the largest component of each lane's step. */
+ * kernel_local_compute_inverse_jacobian() computed. Returns the magnitude of the largest component of each lane's step.
+ */
 SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
 {
     const vf most = vf_set(1), far = vf_set(1.25f);
@@ -369,18 +370,19 @@ SIMD_INLINE vm kernel_local_invert_maps(int type, const kernel_local_cells *cell
     kernel_local_newton_residual(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
     kernel_nonlinear_terms_at(type, p->r, p->term, p->slopes);
-    kernel_local_derivatives(type, p);
+    kernel_local_compute_inverse_jacobian(type, p);
     const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
     vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));
     for (int step = 0; step < KERNEL_LOCAL_STEPS && __builtin_expect(vm_any(open), 0); step++) {
-        kernel_local_derivatives(type, p);
+        kernel_local_compute_inverse_jacobian(type, p);
         open = vm_andnot(open, vf_le(kernel_local_step(type, p, open), vf_set(7e-4f)));
     }
     return vm_not(open);
 }
 
 /* Returns the field at the reference coordinates r in each point's cell. lane: the lane that holds the cell. */
-SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
+SIMD_INLINE vf kernel_local_evaluate_field(int type, const kernel_local_cells *cells, vi lane,
+                                           const kernel_local_points *p)
 {
     vf v = kernel_gather_lane(cells->field[0], lane);
     for (int i = 0; i < 3; i++) v = vf_muladd(kernel_gather_lane(cells->field[1 + i], lane), p->r[i], v);

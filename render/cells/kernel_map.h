@@ -91,7 +91,7 @@ typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
 
-SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
+SIMD_INLINE kernel_product kernel_compute_coordinate_product(bool is_pyramid, const vf r[3])
 {
     kernel_product out = {r[0] * r[1], r[1], r[0], vf_set(0)};
     if (is_pyramid) {
@@ -162,9 +162,9 @@ typedef struct kernel_map {
 
 /* Computes the map of each ray's own cell. at[n][vertex][lane]: x, y, z (n = 0, 1, 2) and field (n = 3) of the cell in
  * this lane; lane: the lane of each ray's cell in these arrays. */
-SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map *out, int type)
+SIMD_INLINE void kernel_compute_maps_of_type(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map *out, int type)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     out->is_pyramid = kernel_has_apex(type);
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
@@ -182,15 +182,15 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
     }
 }
 
-static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][SIMD_WIDTH], vi lane, int type,
+static __attribute__((noinline)) void kernel_compute_maps(const float (*at)[8][SIMD_WIDTH], vi lane, int type,
                                                           kernel_map *out)
 {
-    KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
+    KERNEL_OF_TYPE(type, kernel_compute_maps_of_type, at, lane, out);
 }
 
 /* Copies `count` numbers, one for each vertex of a cell, to all lanes of `out`. If the cell has fewer than eight
  * vertices, the remaining entries become 0. */
-SIMD_INLINE void kernel_map_spread(const float *numbers, int count, float out[8][SIMD_WIDTH])
+SIMD_INLINE void kernel_broadcast_vertex_numbers(const float *numbers, int count, float out[8][SIMD_WIDTH])
 {
     for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? numbers[i] : 0));
 }
@@ -200,15 +200,15 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
 {
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     float at[4][8][SIMD_WIDTH];
-    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, at[n]);
-    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])at, vi_set(0), c->type, m);
+    for (int n = 0; n < 4; n++) kernel_broadcast_vertex_numbers(numbers[n], c->count, at[n]);
+    kernel_compute_maps((const float(*)[8][SIMD_WIDTH])at, vi_set(0), c->type, m);
 }
 
 /* Computes the polynomial coefficients c of a field in each ray's own cell. values: the field by vertex, in arrays
  * whose lanes are cells; lane: the lane of each ray's cell. */
 SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi lane, vf c[8], int type)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     vf v[8];
     for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(values[i], lane);
     for (int half = 0; half < 2; half++) {
@@ -221,9 +221,9 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
 
 /* Returns a field at the reference coordinates r in each ray's own cell. values: the field by vertex, in arrays whose
  * lanes are cells; lane: the lane of each ray's cell in these arrays. */
-SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
+SIMD_INLINE vf kernel_maps_evaluate_field(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
-    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
+    const kernel_product m = kernel_compute_coordinate_product(kernel_has_apex(type), r);
     vf c[8];
     kernel_maps_polynomial(values, lane, c, type);
     return kernel_polynomial_value(c, kernel_has_apex(type), &m, r);
@@ -246,7 +246,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
     vm open = wanted;
     kernel_rays_at(rays, map, t, target);
     for (int step = 0; step < KERNEL_MAP_STEPS && vm_any(open); step++) {
-        const kernel_product m = kernel_product_at(map->is_pyramid, r);
+        const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, r);
         vf cross[3][3];
         const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
         const vf inverse = vf_select(vf_eq(det, vf_set(0)), vf_set(0), 1.0f / det);
@@ -297,9 +297,9 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map,
 
 /* Computes a vector parallel to the field's gradient at the reference coordinates r, in tile space, of any length and
  * of either sign. */
-SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf out[3])
+SIMD_INLINE void kernel_compute_gradient_direction(const kernel_map *map, const vf r[3], vf out[3])
 {
-    const kernel_product m = kernel_product_at(map->is_pyramid, r);
+    const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, r);
     vf cross[3][3], g[3];
     kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
     kernel_polynomial_gradient(map->field, map->is_pyramid, &m, r, g);
@@ -341,8 +341,8 @@ SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[
 /* Returns the field at depth t on the rays in `wanted`, and replaces the guess in r by the reference coordinates there.
  * For rays for which the map cannot be inverted, field and reference coordinates are interpolated linearly between the
  * interval's ends, and *failures is increased by the number of these rays. */
-SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map, const kernel_interval *i, vm wanted,
-                                  vf t, vf r[3], int64_t *failures)
+SIMD_INLINE vf kernel_evaluate_field_on_rays(const kernel_rays *rays, const kernel_map *map, const kernel_interval *i,
+                                             vm wanted, vf t, vf r[3], int64_t *failures)
 {
     const vm failed = kernel_map_invert(rays, map, wanted, t, r);
     const bool has_failed = vm_any(failed);
@@ -352,22 +352,22 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
         for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
         *failures += __builtin_popcount(vm_bits(failed));
     }
-    const kernel_product m = kernel_product_at(map->is_pyramid, r);
+    const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, r);
     const vf value = kernel_polynomial_value(map->field, map->is_pyramid, &m, r);
     return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 
 /* Returns the field at depth t on a packet's rays, in the single cell of `map` and the interval i. */
-static __attribute__((noinline, unused)) vf kernel_value_at(kernel_packet *p, const kernel_map *map,
-                                                            const kernel_interval *i, vm rays, vf t)
+static __attribute__((noinline, unused)) vf kernel_evaluate_field_in_one_cell(kernel_packet *p, const kernel_map *map,
+                                                                              const kernel_interval *i, vm rays, vf t)
 {
     const kernel_rays own = kernel_packet_rays(p);
     vf r[3];
     kernel_reference_on_chord(i, t, r);
-    return kernel_solve_lanes(&own, map, i, rays, t, r, &p->thread->map_failures);
+    return kernel_evaluate_field_on_rays(&own, map, i, rays, t, r, &p->thread->map_failures);
 }
 
-SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, kernel_point *out)
+SIMD_INLINE void kernel_get_points_at_interval_ends(const kernel_interval *i, kernel_point *in, kernel_point *out)
 {
     in->t = i->t_in;
     in->value = i->v_in;

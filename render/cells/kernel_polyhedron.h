@@ -133,8 +133,8 @@ SIMD_INLINE kernel_edge_error kernel_polyhedron_compute_line(polyhedron *c, cons
     const kernel_line line =
         kernel_line_in_packet(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
     memcpy(c->lines[n], &line, sizeof line);
-    return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_position(c, a),
-                             kernel_polyhedron_position(c, b));
+    return kernel_compute_edge_error(&line, p->tile->radius, kernel_polyhedron_position(c, a),
+                                     kernel_polyhedron_position(c, b));
 }
 
 /* Returns the polyhedron with the values of a layer's field; NULL if a value is not finite, or if memory ran out. */
@@ -157,7 +157,7 @@ SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet 
         most = kernel_edge_error_max(most, kernel_polyhedron_compute_line(c, p, i, c->edges[i][0], c->edges[i][1]));
     for (int i = 0; i < c->vertex_count; i++)
         most = kernel_edge_error_max(most, kernel_polyhedron_compute_line(c, p, c->edge_count + i, i, c->vertex_count));
-    c->least = kernel_least_weight_bound(most);
+    c->least = kernel_bound_least_weight_sum(most);
 }
 
 /* ---- crossings of the surface ---- */
@@ -182,7 +182,7 @@ SIMD_INLINE void kernel_poly_compute_edge_function(kernel_poly_crossings *r, int
                                                    kernel_polyhedron_position(c, b));
 }
 
-SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
+SIMD_INLINE void kernel_poly_recompute_weights(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
 {
     const polyhedron *c = r->cell;
     kernel_weights_recompute(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
@@ -200,7 +200,7 @@ static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedr
     if (!vm_any(out->mask)) return out->mask;
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
     kernel_weights mended = *w;
-    kernel_poly_recompute(r, out->mask, &mended);
+    kernel_poly_recompute_weights(r, out->mask, &mended);
     kernel_triangle_values_at(r->cell, &mended, r->has_colour, out);
     return out->mask;
 }
@@ -252,8 +252,8 @@ SIMD_INLINE void kernel_facet_set_point_of_face(const polyhedron *c, const int c
 
 /* Orders the two points of rays that cross a quad's patch twice and also both of its triangles m[0] and m[1]: places[n]
  * becomes the point that belongs to m[n], which is the nearer point for the triangle that is crossed first. */
-static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
-                                                                    kernel_point places[2])
+static __attribute__((noinline, cold)) void kernel_match_quad_points_to_triangles(kernel_triangle_crossings *const m[2],
+                                                                                  kernel_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
@@ -288,7 +288,7 @@ static void kernel_poly_cross_quad(kernel_poly_crossings *r, int first)
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
     const vm twice = kernel_quad_sides_allow_two_points(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
     const int count = kernel_compute_quad_points(&quad, once, twice, places);
-    if (count == 2) kernel_quad_points_pair(m, places);
+    if (count == 2) kernel_match_quad_points_to_triangles(m, places);
     r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
@@ -379,7 +379,7 @@ static void kernel_poly_cross_sheets(kernel_poly_crossings *r)
         m->mask = kernel_rays_inside_triangle(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
-        kernel_poly_recompute(r, m->mask, &w);
+        kernel_poly_recompute_weights(r, m->mask, &w);
         kernel_triangle_values_at(c, &w, r->has_colour, m);
         r->met_sheets[r->sheet_count++] = i;
     }
@@ -387,7 +387,7 @@ static void kernel_poly_cross_sheets(kernel_poly_crossings *r)
 
 /* Extends the intervals *s of rays inside a tet, so that they contain the crossings *m of one of the tet's faces. hit:
  * the rays that cross this face. */
-SIMD_INLINE void kernel_subtet_extend(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
+SIMD_INLINE void kernel_extend_tet_interval(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
     s->t_in = vf_select(first, m->t, s->t_in);
@@ -416,12 +416,12 @@ static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
         s->v_in = s->v_out = s->w_in = s->w_out = vf_set(0);
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
-                kernel_subtet_extend(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
+                kernel_extend_tet_interval(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* a ray through the tet crosses at least one of the tet's three sheets; it may also cross the tet's fourth
          * face, the surface triangle */
         const vm hit =
             kernel_rays_inside_triangle(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        if (vm_any(hit)) kernel_subtet_extend(s, &r->facets[i], hit);
+        if (vm_any(hit)) kernel_extend_tet_interval(s, &r->facets[i], hit);
     }
 }
 
@@ -471,7 +471,7 @@ static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, 
  * crossings of the two surface triangles at the interval's ends, and also between its crossings of the two faces of
  * which these triangles are parts. A sheet beyond the triangles belongs to a tet that extends out of the cell, and does
  * not affect the cell's field. */
-SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
+SIMD_INLINE vm kernel_poly_is_sheet_in_interval(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
     const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));
     const vm within = vm_and(vf_lt(r->in.t, sheet->t), vf_lt(sheet->t, r->out.t));
@@ -481,8 +481,8 @@ SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, con
 /* Computes the field *u and the colour field *w just inside an end of the interval: the value on the face, plus the
  * signed sum of the fields of all tets other than the one whose surface triangle is crossed (end). before: set for the
  * far end. */
-SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_triangle_crossings *end,
-                                         bool before, vf *u, vf *w)
+SIMD_INLINE void kernel_poly_compute_value_inside_end(const kernel_poly_crossings *r, vm rays,
+                                                      const kernel_triangle_crossings *end, bool before, vf *u, vf *w)
 {
     vf v_sum = end->v, w_sum = end->w;
     kernel_poly_sum_tet_fields(r, rays, end->t, before, &v_sum, &w_sum);
@@ -490,19 +490,19 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
     *w = end->w_face + (w_sum - end->w);
 }
 
-/* Computes the data from which kernel_profile_next() returns the piecewise linear field along each ray in the current
- * interval: the field at the crossed sheets and just inside both ends. */
-static void kernel_poly_prepare_profile(kernel_poly_crossings *r)
+/* Computes the data from which kernel_find_next_linear_piece() returns the piecewise linear field along each ray in the
+ * current interval: the field at the crossed sheets and just inside both ends. */
+static void kernel_poly_prepare_piecewise_field(kernel_poly_crossings *r)
 {
     kernel_interval *i = &r->interval;
     kernel_poly_cross_sheets(r);
     if (r->cell->is_star_shaped) return;
     kernel_poly_intersect_tets(r);
-    kernel_poly_inner_value(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
-    kernel_poly_inner_value(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
+    kernel_poly_compute_value_inside_end(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
+    kernel_poly_compute_value_inside_end(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
         kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm held = kernel_poly_interval_contains(r, sheet);
+        const vm held = kernel_poly_is_sheet_in_interval(r, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
         kernel_poly_sum_tet_fields(r, held, sheet->t, false, &v, &w);
@@ -511,9 +511,9 @@ static void kernel_poly_prepare_profile(kernel_poly_crossings *r)
     }
 }
 
-/* Sets *piece to an interval of length zero at the begin of each ray's current interval. kernel_profile_next() then
- * returns the first linear piece of the field. */
-SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_interval *piece)
+/* Sets *piece to an interval of length zero at the begin of each ray's current interval.
+ * kernel_find_next_linear_piece() then returns the first linear piece of the field. */
+SIMD_INLINE void kernel_begin_linear_pieces(const kernel_poly_crossings *r, kernel_interval *piece)
 {
     const kernel_interval *i = &r->interval;
     piece->mask = i->mask;
@@ -524,13 +524,13 @@ SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_int
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, vf v_out, kernel_interval *piece)
+SIMD_INLINE void kernel_find_next_linear_piece(const kernel_poly_crossings *r, vf v_out, kernel_interval *piece)
 {
     vf t = r->interval.t_out, v = v_out, w = r->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
         const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm nearer =
-            vm_and(kernel_poly_interval_contains(r, sheet), vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
+        const vm nearer = vm_and(kernel_poly_is_sheet_in_interval(r, sheet),
+                                 vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
         w = vf_select(nearer, sheet->w_face, w);
@@ -544,7 +544,7 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, vf v_out, k
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_continues(const kernel_poly_crossings *r, const kernel_interval *piece, vm mask)
+SIMD_INLINE vm kernel_has_next_linear_piece(const kernel_poly_crossings *r, const kernel_interval *piece, vm mask)
 {
     return vm_and(mask, vf_lt(piece->t_out, r->interval.t_out));
 }

@@ -76,7 +76,7 @@ static inline double kernel_scalar_cross(const kernel_quad *q, int lane, int i, 
     return (double)q->x[i][lane] * (double)q->y[j][lane] - (double)q->x[j][lane] * (double)q->y[i][lane];
 }
 
-static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_quad *q, int lane)
+static inline kernel_scalar_quadratic kernel_make_quadratic_in_r(const kernel_quad *q, int lane)
 {
     return (kernel_scalar_quadratic){kernel_scalar_cross(q, lane, 0, 1),
                                      0.5 * (kernel_scalar_cross(q, lane, 0, 2) + kernel_scalar_cross(q, lane, 3, 1)),
@@ -84,7 +84,7 @@ static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_quad *q, int 
                                      kernel_is_negative(q->e32, lane)};
 }
 
-static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_quad *q, int lane)
+static inline kernel_scalar_quadratic kernel_make_quadratic_in_s(const kernel_quad *q, int lane)
 {
     return (kernel_scalar_quadratic){kernel_scalar_cross(q, lane, 0, 3),
                                      0.5 * (kernel_scalar_cross(q, lane, 0, 2) + kernel_scalar_cross(q, lane, 1, 3)),
@@ -120,7 +120,7 @@ static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double
 }
 
 /* Solves v0 + x (v1 - v0) = 0 for x, clamped to [0, 1]. v0 and v1 must not both be 0. */
-static inline double kernel_scalar_zero(double v0, double v1)
+static inline double kernel_find_linear_zero(double v0, double v1)
 {
     const double x = v0 / (v0 - v1);
     return x >= 0 ? fmin(x, 1) : 0;
@@ -129,23 +129,24 @@ static inline double kernel_scalar_zero(double v0, double v1)
 /* Returns the patch's parameter at the ray's point if the quadratic A or B of this parameter (see the top of this file)
  * is zero everywhere: the limit of the parameters on rays that are moved by (e, e²). The quad's two sides at the ends
  * of the parameter's range are from corner i to i2 and from corner j to j2. */
-static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, int i2, int j, int j2)
+static inline double kernel_find_limit_of_patch_parameter(const kernel_quad *q, int lane, int i, int i2, int j, int j2)
 {
     double x[4], y[4];
     for (int k = 0; k < 4; k++) x[k] = (double)q->x[k][lane], y[k] = (double)q->y[k][lane];
     const double y0 = y[i2] - y[i], y1 = y[j2] - y[j];
-    return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(x[i2] - x[i], x[j2] - x[j]);
+    return y0 != y1 ? kernel_find_linear_zero(y0, y1) : kernel_find_linear_zero(x[i2] - x[i], x[j2] - x[j]);
 }
 
 /* Computes, for the ray in one lane, the point at which it meets the patch and at which the patch's Jacobian J has the
  * sign of `root`. The magnitude of root is the square root of the discriminant D. (The top of this file defines J and
  * D.) */
-static inline void kernel_scalar_point(const kernel_quad *q, int lane, const kernel_scalar_quadratic *a,
-                                       const kernel_scalar_quadratic *b, double root, kernel_point *out)
+static inline void kernel_compute_patch_point_of_ray(const kernel_quad *q, int lane, const kernel_scalar_quadratic *a,
+                                                     const kernel_scalar_quadratic *b, double root, kernel_point *out)
 {
-    const double s = kernel_scalar_vanishes(a) ? kernel_scalar_limit(q, lane, 0, 3, 1, 2) : kernel_scalar_root(a, root);
-    const double r =
-        kernel_scalar_vanishes(b) ? kernel_scalar_limit(q, lane, 0, 1, 3, 2) : kernel_scalar_root(b, -root);
+    const double s = kernel_scalar_vanishes(a) ? kernel_find_limit_of_patch_parameter(q, lane, 0, 3, 1, 2)
+                                               : kernel_scalar_root(a, root);
+    const double r = kernel_scalar_vanishes(b) ? kernel_find_limit_of_patch_parameter(q, lane, 0, 1, 3, 2)
+                                               : kernel_scalar_root(b, -root);
     double z[4];
     for (int k = 0; k < 4; k++) z[k] = (double)q->z[k][lane];
     out->r[0][lane] = (float)s;
@@ -156,11 +157,11 @@ static inline void kernel_scalar_point(const kernel_quad *q, int lane, const ker
 /* Computes the point at which a ray that crosses exactly one of the quad's two triangles meets the patch. */
 static inline void kernel_scalar_single_point(const kernel_quad *q, int lane, kernel_point *out)
 {
-    const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
+    const kernel_scalar_quadratic a = kernel_make_quadratic_in_s(q, lane), b = kernel_make_quadratic_in_r(q, lane);
     const bool by_b = kernel_scalar_changes_sign(&b);
     const double root = __builtin_sqrt(kernel_scalar_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
-    kernel_scalar_point(q, lane, &a, &b, by_b != is_rising ? root : -root, out);
+    kernel_compute_patch_point_of_ray(q, lane, &a, &b, by_b != is_rising ? root : -root, out);
 }
 
 /* Returns whether the quadratic may have two roots in (0, 1), because c0 and c2, its values at 0 and 1, have one sign
@@ -174,12 +175,12 @@ static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadrati
  * not meet the patch. */
 static inline bool kernel_scalar_two_points(const kernel_quad *q, int lane, kernel_point out[2])
 {
-    const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
+    const kernel_scalar_quadratic a = kernel_make_quadratic_in_s(q, lane), b = kernel_make_quadratic_in_r(q, lane);
     if (!kernel_scalar_may_have_two_roots(&a) || !kernel_scalar_may_have_two_roots(&b)) return false;
     const double root = __builtin_sqrt(kernel_scalar_discriminant(&b));
     if (!(root > 0)) return false;
-    kernel_scalar_point(q, lane, &a, &b, root, &out[0]);
-    kernel_scalar_point(q, lane, &a, &b, -root, &out[1]);
+    kernel_compute_patch_point_of_ray(q, lane, &a, &b, root, &out[0]);
+    kernel_compute_patch_point_of_ray(q, lane, &a, &b, -root, &out[1]);
     return true;
 }
 
@@ -346,7 +347,7 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 /* Returns the rays that cross exactly one of the two triangles into which a diagonal splits a quad. around[i]: the rays
  * on which the edge function of the quad's edge i is negative; the edges are in cyclic order and begin at the
  * diagonal's first corner. side: the rays on which the diagonal's edge function is negative. */
-SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
+SIMD_INLINE vm kernel_find_rays_crossing_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
     const vm half1 = vm_not(vm_or(vm_xor(side, around[2]), vm_xor(around[2], around[3])));

@@ -76,7 +76,7 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 
 /* Returns a vector whose sign bits are set for the rays that are on the same side of all edges of a face with `count`
  * edges. around: edge functions of the face's edges, in cyclic order; only their sign bits are used. */
-SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
+SIMD_INLINE vi kernel_are_on_same_side_of_edges(const vi around[4], int count)
 {
     vi differ = (around[0] ^ around[1]) | (around[1] ^ around[2]);
     if (count == 4) differ |= around[2] ^ around[3];
@@ -95,7 +95,7 @@ SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int co
 /* Returns the rays on which a crossed face is a quad. face: index, in each ray's cell, of one of the two faces that the
  * ray crosses; n: 0 if it is the one with the smaller index, 1 if it is the other one. In a wedge, faces 0 and 1 are
  * triangles. In a pyramid, face 0 is the only quad, so that it never has the larger index. */
-SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
+SIMD_INLINE vm kernel_is_crossed_face_a_quad(int type, int n, vi face)
 {
     const vf number = vf_from_vi(face);
     return KERNEL_BY_SHAPE(type, vm_all_lanes(), vf_lt(vf_set(1.5f), number),

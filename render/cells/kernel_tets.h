@@ -49,13 +49,13 @@ SIMD_INLINE void kernel_tets_project(const kernel_tets *t, vf x[4], vf y[4])
     }
 }
 
-SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+SIMD_INLINE void kernel_tets_compute_exact_edge_functions(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf x[4], y[4];
     kernel_tets_project(t, x, y);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        e[n] = kernel_edge_between(x[i], y[i], x[j], y[j]);
+        e[n] = kernel_compute_exact_edge_function(x[i], y[i], x[j], y[j]);
     }
 }
 
@@ -64,7 +64,7 @@ static __attribute__((noinline)) void kernel_tets_recompute_uncertain_edges(cons
                                                                             vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
-    kernel_tets_edges_projected(t, exact);
+    kernel_tets_compute_exact_edge_functions(t, exact);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const vm sure = vf_lt(KERNEL_TET_NUMBER(t, bound[n]), vf_abs(e[n]));
         e[n] = vf_select(sure, e[n], exact[n]);
@@ -74,12 +74,13 @@ static __attribute__((noinline)) void kernel_tets_recompute_uncertain_edges(cons
 /* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if e is computed from the edges'
  * lines (kernel_cell.h), which are valid for camera rays through the tile's pixels; otherwise e is computed from
  * projected vertices. */
-SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
+SIMD_INLINE void kernel_tets_compute_edge_functions(const kernel_tets *t, vm rays, bool is_pencil,
+                                                    vf e[KERNEL_TET_EDGES])
 {
     const vf u = t->lane_rays->u, v = t->lane_rays->v;
     vf least = vf_set(INFINITY);
     if (!is_pencil) {
-        kernel_tets_edges_projected(t, e);
+        kernel_tets_compute_exact_edge_functions(t, e);
         return;
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
@@ -177,7 +178,7 @@ SIMD_INLINE void kernel_tets_set_interval(const kernel_sums ends[2], bool has_co
 }
 
 /* Returns those of the rays that cross face n (hit) whose sum of weights is too small for an accurate crossing. */
-SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
+SIMD_INLINE vm kernel_tets_find_inaccurate_crossings(const kernel_tets *t, int n, vm hit, vf weight)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n])));
 }
@@ -191,12 +192,12 @@ kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES
     vf exact[KERNEL_TET_EDGES];
     kernel_sums sums[4];
     vm hit[4];
-    kernel_tets_edges_projected(t, exact);
+    kernel_tets_compute_exact_edge_functions(t, exact);
     kernel_tets_find_crossed_faces(rays, e, hit);
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
         const int ij = face[3], jk = face[4], ik = face[5];
-        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_sum_weights(e[ij], e[jk], e[ik]));
+        const vm weak = kernel_tets_find_inaccurate_crossings(t, n, hit[n], kernel_sum_weights(e[ij], e[jk], e[ik]));
         sums[n] =
             kernel_tets_weighted_sums(t, face, vf_select(weak, exact[ij], e[ij]), vf_select(weak, exact[jk], e[jk]),
                                       vf_select(weak, exact[ik], e[ik]), has_colour);
@@ -213,7 +214,7 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     vf e[KERNEL_TET_EDGES];
     vm weak[4];
     kernel_sums sums[4], ends[2];
-    kernel_tets_edges(t, rays, is_pencil, e);
+    kernel_tets_compute_edge_functions(t, rays, is_pencil, e);
     kernel_tets_find_crossed_faces(rays, e, hit);
     out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
     out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
@@ -224,7 +225,7 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     }
     kernel_tets_select_crossed_faces(hit, sums, ends);
     if (is_pencil) {
-        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
+        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_find_inaccurate_crossings(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
             kernel_lane_rays lane_rays;
             const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
@@ -241,31 +242,33 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
 
 /* Computes the rays' intervals in their tets, and the rays that cross each face (hit). is_uniform: set if all rays have
  * the tet in the given lane; otherwise each ray has that of its own lane (r->lane). is_pencil: set if edge functions
- * are computed from the edges' lines (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
-SIMD_INLINE void kernel_tet_rays_cross(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
-                                       bool is_uniform, int lane, bool is_pencil, bool has_colour, vm hit[4],
-                                       kernel_interval *out)
+ * are computed from the edges' lines (kernel_tets_compute_edge_functions()); has_colour: set if w_in and w_out are
+ * computed, too. */
+SIMD_INLINE void kernel_tet_rays_find_intervals_and_faces(const kernel_transformed_tets *transformed,
+                                                          const kernel_lane_rays *r, bool is_uniform, int lane,
+                                                          bool is_pencil, bool has_colour, vm hit[4],
+                                                          kernel_interval *out)
 {
     const kernel_tets tets = {.lane_rays = r, .transformed = transformed, .is_uniform = is_uniform, .lane = lane};
     kernel_tets_interval(&tets, r->active, is_pencil, has_colour, hit, out);
 }
 
-/* Computes the rays' intervals in their tets, with edge functions from the edges' lines (kernel_tets_edges()).
- * has_colour: set if w_in and w_out are computed, too. */
+/* Computes the rays' intervals in their tets, with edge functions from the edges' lines
+ * (kernel_tets_compute_edge_functions()). has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                           bool has_colour, kernel_interval *out)
 {
     vm hit[4];
-    kernel_tet_rays_cross(transformed, r, false, 0, true, has_colour, hit, out);
+    kernel_tet_rays_find_intervals_and_faces(transformed, r, false, 0, true, has_colour, hit, out);
 }
 
 /* Computes the intervals of rays that all have the tet in the given lane. is_pencil: set if edge functions are computed
- * from the edges' lines (kernel_tets_edges()); has_colour: set if w_in and w_out are computed, too. */
+ * from the edges' lines (kernel_tets_compute_edge_functions()); has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval_in_one(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                                  int lane, bool is_pencil, bool has_colour, kernel_interval *out)
 {
     vm hit[4];
-    kernel_tet_rays_cross(transformed, r, true, lane, is_pencil, has_colour, hit, out);
+    kernel_tet_rays_find_intervals_and_faces(transformed, r, true, lane, is_pencil, has_colour, hit, out);
 }
 
 #endif

@@ -1,9 +1,9 @@
 /* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
  * their triangular faces. The operations are those of the functions for single cells, kernel_cell_subtract_isovalue(),
- * kernel_transform_in_tile(), kernel_cell_order() and kernel_cell_compute_lines(), so the results are bit-identical.
- * Vertices are put in canonical order first (kernel_cell_canonical_order()), so that all data are stored in that order.
- * Computations in double are done for one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a
- * constant, so that loops have constant lengths. */
+ * kernel_transform_in_tile(), kernel_cell_sort_vertices() and kernel_cell_compute_lines(), so the results are
+ * bit-identical. Vertices are put in canonical order first (kernel_cell_canonical_order()), so that all data are stored
+ * in that order. Computations in double are done for one half of the lanes (kernel_wide.h) after the other. Callers
+ * pass the type as a constant, so that loops have constant lengths. */
 #ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
 #define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
@@ -34,7 +34,7 @@ typedef struct kernel_transformed_curved {
     float at[4][8][SIMD_WIDTH];
     /* corners[face * SIMD_WIDTH + lane]: a word with the indices, in the cell, of the vertices at the face's corners,
      * four bits each, from bit 0 on. Quads are in the order of kernel_quad_corners(), triangles in the order of
-     * coordinates (kernel_triangle_order()). */
+     * coordinates (kernel_sort_triangle_vertices()). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     /* The lines (kernel_line) of the edges of triangular faces. triangles[n] belongs to the n-th triangular face in the
      * list of faces of kernel_shape: the members c, cu, cv and bound, each for the edges ij, jk and ik, where i, j, k
@@ -51,8 +51,8 @@ typedef struct kernel_transformed_curved {
     /* for vectors of 16 lanes: a copy of `at` and `corners` in which the numbers of a cell are contiguous, in three
      * rows of 16 numbers per cell: x and y by vertex; z and the field by vertex; `corners` by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
-    /* The following members are used only by kernel_transformed_curved_cell(), which copies one lane's cell. world:
-     * coordinates by vertex and axis, in two halves of the lanes; rank: rank of each vertex in the order of
+    /* The following members are used only by kernel_copy_transformed_curved_cell(), which copies one lane's cell.
+     * world: coordinates by vertex and axis, in two halves of the lanes; rank: rank of each vertex in the order of
      * coordinates; vertex: index of each vertex in the mesh. */
     kernel_f64 world[8][3][2];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
@@ -102,7 +102,7 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
     for (int i = 0; i < count; i++)
         for (int j = i + 1; j < count; j++) {
-            const vf after = vf_select(kernel_raw_before(is_narrow, h->at[j], h->at[i]), one, zero);
+            const vf after = vf_select(kernel_is_raw_position_before(is_narrow, h->at[j], h->at[i]), one, zero);
             h->rank[i] += after;
             h->rank[j] -= after;
         }
@@ -111,7 +111,7 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
 /* Puts a hex's vertices in canonical order. First the hex is mirrored along its reference coordinates such that the
  * vertex of smallest rank becomes vertex 0. Then its three reference coordinates are exchanged such that the ranks of
  * the neighbours of vertex 0 increase along x, y, z. */
-SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
+SIMD_INLINE void kernel_sort_hex_vertices(kernel_sorted_vertices *h, bool is_narrow)
 {
     /* vertex[b]: index of the hex's vertex whose reference coordinates x, y and z, each 0 or 1, are bits 0, 1 and 2 of
      * b */
@@ -136,7 +136,7 @@ SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_nar
 
 /* Puts a wedge's vertices in canonical order. Vertex 0 is the vertex of smallest rank. Vertex 1 is that one of the two
  * other vertices of its triangle that has the smaller rank. */
-SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_narrow)
+SIMD_INLINE void kernel_sort_wedge_vertices(kernel_sorted_vertices *h, bool is_narrow)
 {
     vm over = vm_none();
     for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
@@ -153,7 +153,7 @@ SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_n
 
 /* Puts a pyramid's vertices in canonical order. Vertex 0 is the vertex of the base with the smallest rank. Vertex 1 is
  * that one of its two neighbours in the base that has the smaller rank. The apex stays last. */
-SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_vertices *h, bool is_narrow)
+SIMD_INLINE void kernel_sort_pyramid_vertices(kernel_sorted_vertices *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
     const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
@@ -168,16 +168,16 @@ SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_vertices *h, bool is
 SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     if (kernel_is_box(type))
-        kernel_sorted_curved_hex(h, is_narrow);
+        kernel_sort_hex_vertices(h, is_narrow);
     else if (kernel_is_prism(type))
-        kernel_sorted_curved_wedge(h, is_narrow);
+        kernel_sort_wedge_vertices(h, is_narrow);
     else
-        kernel_sorted_curved_pyramid(h, is_narrow);
+        kernel_sort_pyramid_vertices(h, is_narrow);
 }
 
 /* Returns the lanes whose cell has an edge of length zero, so that a quad has collapsed to a triangle
  * (kernel_quad_collapses()) or a triangle to a line. */
-SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_find_cells_with_collapsed_edges(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
@@ -194,7 +194,7 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, b
 /* Returns the lanes whose hex has edges parallel to the world axes. In canonical order, the first, second and third
  * reference coordinate of such a hex increase along the world's z, y and x axis. Each world coordinate of a vertex then
  * equals that of vertex 0 or that of the neighbour of vertex 0 along this axis. */
-SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_find_axis_parallel_hexes(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     static const int neighbours[3] = {4, 3, 1};
     vm out = vm_all_lanes();
@@ -211,7 +211,7 @@ SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, boo
 SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow,
                                           int type, int32_t (*const vertices)[SIMD_WIDTH])
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     kernel_sorted_vertices h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
@@ -225,8 +225,8 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
-    out->cuboids = kernel_is_box(type) ? vm_bits(kernel_sorted_curved_cuboids(&h, is_narrow, type)) : 0;
-    return kernel_sorted_curved_collapsed(&h, is_narrow, type);
+    out->cuboids = kernel_is_box(type) ? vm_bits(kernel_find_axis_parallel_hexes(&h, is_narrow, type)) : 0;
+    return kernel_find_cells_with_collapsed_edges(&h, is_narrow, type);
 }
 
 /* ---- edge functions ---- */
@@ -234,7 +234,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 /* Returns a word with the indices, in the cell, of the vertices at a quad's corners, four bits each, from bit 0 on. The
  * corners are listed in cyclic order: first the corner of smallest rank, then that one of its two neighbours which has
  * the smaller rank. loop: the quad's vertices in cyclic order. */
-SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
+SIMD_INLINE vi kernel_pack_sorted_quad_corners(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
     /* lanes in which corner 2 has a smaller rank than corner 0 (second), corner 3 a smaller rank than corner 1
@@ -258,7 +258,8 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
 /* Returns a word with the indices, in the cell, of the vertices at a triangle's corners, sorted by rank, four bits
  * each, from bit 0 on. first[n], last[n]: the lanes in which vertex n of the loop has the smallest and the largest
  * rank; falls[n]: the lanes in which the rank decreases from vertex n of the loop to the next. */
-SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], vm first[3], vm last[3], vm falls[3])
+SIMD_INLINE vi kernel_pack_sorted_triangle_corners(const signed char *loop, const vf rank[8], vm first[3], vm last[3],
+                                                   vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
     vi word = vi_set(0);
@@ -274,8 +275,8 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], v
 
 /* Permutes three numbers, one per side of a triangle, into the order of the sides ij, jk, ik, where i, j, k are the
  * corners sorted by rank. opposite[n]: the number of the side opposite to corner n of the loop. first, last: from
- * kernel_triangle_word(). The sides ij, jk and ik are opposite to the corners k, i and j. */
-SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
+ * kernel_pack_sorted_triangle_corners(). The sides ij, jk and ik are opposite to the corners k, i and j. */
+SIMD_INLINE void kernel_permute_triangle_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
 {
     out[0] = vf_select(last[0], opposite[0], vf_select(last[1], opposite[1], opposite[2]));
     out[1] = vf_select(first[0], opposite[0], vf_select(first[1], opposite[1], opposite[2]));
@@ -290,30 +291,30 @@ SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *tr
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf at[8][3], size[8];
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         for (int a = 0; a < 3; a++) at[i][a] = vf_load(transformed->at[a][i]);
-        size[i] = kernel_lanes_size(f, tile, at[i]);
+        size[i] = kernel_lanes_bound_projected_position(f, tile, at[i]);
     }
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
         kernel_lanes_edge_function(f, at[i], at[j], out[n]);
-        kernel_lanes_edge_extent(out[n], tile->radius, at[i], at[j], &out[n][4], &out[n][5]);
-        out[n][3] = kernel_lanes_edge_error(size[i], size[j]);
+        kernel_lanes_compute_error_and_extent(out[n], tile->radius, at[i], at[j], &out[n][4], &out[n][5]);
+        out[n][3] = kernel_lanes_bound_edge_function_error(size[i], size[j]);
     }
 }
 
 /* Stores the data of a triangular face: its corners sorted by rank, the lines of its edges, and the least sum of
  * weights at which its crossings are accurate. face: index of the face in the shape; lines: from
  * kernel_lanes_edge_functions(). */
-SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
-                                             vf (*const lines)[6])
+SIMD_INLINE void kernel_store_triangular_face(kernel_transformed_curved *out, int type, int face, const vf rank[8],
+                                              vf (*const lines)[6])
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
     const int number = face - kernel_first_triangle(type);
     vm first[3], last[3], falls[3];
     vf opposite[3], in_order[6][3];
-    const vi word = kernel_triangle_word(loop, rank, first, last, falls);
+    const vi word = kernel_pack_sorted_triangle_corners(loop, rank, first, last, falls);
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     for (int n = 0; n < 6; n++) {
         for (int i = 0; i < 3; i++) {
@@ -322,7 +323,7 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
             const vm falling = sides[side][1] ? vm_not(falls[side]) : falls[side];
             opposite[i] = n < 3 ? vf_select(falling, turned, v) : v;
         }
-        kernel_order_sides(first, last, opposite, in_order[n]);
+        kernel_permute_triangle_sides(first, last, opposite, in_order[n]);
         for (int i = 0; i < 3 && n < 4; i++) vf_store(out->triangles[number][n][i], in_order[n][i]);
     }
     const vf error = (in_order[4][0] + in_order[4][1]) + in_order[4][2];
@@ -330,12 +331,12 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
     vf_store(out->least[number], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
-SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, const kernel_frame *f,
-                                             const kernel_tile *tile, int type)
+SIMD_INLINE void kernel_compute_face_data_of_type(kernel_transformed_curved *out, const kernel_frame *f,
+                                                  const kernel_tile *tile, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf lines[KERNEL_CURVED_EDGES][6], rank[8];
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         vi own_rank;
         memcpy(&own_rank, out->rank[i], sizeof own_rank);
         rank[i] = vf_from_vi(own_rank);
@@ -343,20 +344,20 @@ SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, con
     if (kernel_has_triangles(type)) kernel_lanes_edge_functions(out, f, tile, type, lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
-            kernel_transformed_triangle(out, type, face, rank, lines);
+            kernel_store_triangular_face(out, type, face, rank, lines);
             continue;
         }
-        const vi word = kernel_curved_quad_word(shape->faces[face].vertices, rank);
+        const vi word = kernel_pack_sorted_quad_corners(shape->faces[face].vertices, rank);
         memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     }
 }
 
 /* Computes, for all faces, the words that list their corners (the member `corners`), and, for triangular faces, the
  * lines of their edges and the least sums of weights (`triangles` and `least`). */
-static __attribute__((noinline)) void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
+static __attribute__((noinline)) void kernel_compute_face_data(kernel_transformed_curved *out, const kernel_frame *f,
                                                                const kernel_tile *tile, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_transformed_faces_of, out, f, tile);
+    KERNEL_OF_TYPE(type, kernel_compute_face_data_of_type, out, f, tile);
 }
 
 /* ---- cells of uniform and rectilinear grids ---- */
@@ -433,7 +434,7 @@ SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, 
     }
     const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices)
                                                  : kernel_sorted_curved_fetch(out, p, false, type, vertices);
-    for (int i = 0; i < grid_type_vertices(type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(type); i++) {
         vf at[3];
         kernel_lanes_transform(f, tile, (const kernel_f64(*)[2])out->world[i], at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
@@ -446,7 +447,7 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
                                                int32_t vertices[8][SIMD_WIDTH], const double isovalues[SIMD_WIDTH],
                                                int type)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     kernel_f64 values[8][2];
     vf relative[8];
     const vm collapsed = kernel_transform_curved_vertices(out, p, f, tile, vertices, type);
@@ -462,7 +463,7 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
 
 /* Fetches cells of one type, puts their vertices in canonical order, and transforms them. vertices: indices in the
  * mesh, by vertex and lane. Returns the lanes whose cell has an edge of length zero. The data of faces are not set;
- * kernel_transformed_faces() computes them. */
+ * kernel_compute_face_data() computes them. */
 static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[8][SIMD_WIDTH],
@@ -474,11 +475,11 @@ static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_c
 /* ---- copying one lane's cell ---- */
 
 /* Copies the cell in lane n to a kernel_cell. The lines of the cell's edges are not copied. */
-static __attribute__((noinline)) void kernel_transformed_curved_cell(const kernel_transformed_curved *h, int type,
-                                                                     int n, kernel_cell *c)
+static __attribute__((noinline)) void kernel_copy_transformed_curved_cell(const kernel_transformed_curved *h, int type,
+                                                                          int n, kernel_cell *c)
 {
     c->type = type;
-    c->count = grid_type_vertices(type);
+    c->count = grid_type_vertex_count(type);
     c->is_finite = c->is_transformed = true;
     c->has_lines = false;
     for (int i = 0; i < c->count; i++) {

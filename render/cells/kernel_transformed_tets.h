@@ -1,5 +1,5 @@
 /* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of the
- * functions for single cells, kernel_cell_move_to_tile_space() and kernel_cell_order(), so the results are
+ * functions for single cells, kernel_cell_move_to_tile_space() and kernel_cell_sort_vertices(), so the results are
  * bit-identical. Vertices are sorted by coordinates first, so that all data are stored in that order. Computations in
  * double are done for one half of the lanes (kernel_wide.h) after the other. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
@@ -19,9 +19,9 @@
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
  * members of kernel_line, by edge; doubt: the largest one of the six entries of `bound`; least: for each face, the
- * least sum of weights at which a crossing is accurate (kernel_least_weight()); vertex: indices of the vertices in the
- * mesh. The caller sets f, the vertex values as the layer needs them (kernel_cell.f), and, if the layer has a colour
- * field, `colours`, the values of that field. */
+ * least sum of weights at which a crossing is accurate (kernel_compute_least_weight_sum()); vertex: indices of the
+ * vertices in the mesh. The caller sets f, the vertex values as the layer needs them (kernel_cell.f), and, if the layer
+ * has a colour field, `colours`, the values of that field. */
 typedef struct kernel_transformed_tets {
     /* world coordinates by vertex and axis, and values by vertex, as the caller of the library passed them; in two
      * halves of the lanes */
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const ker
     }
     for (int last = 3; last > 0; last--)
         for (int i = 0; i < last; i++)
-            kernel_sorted_swap(&h, is_narrow, kernel_raw_before(is_narrow, h.at[i + 1], h.at[i]), i, i + 1);
+            kernel_sorted_swap(&h, is_narrow, kernel_is_raw_position_before(is_narrow, h.at[i + 1], h.at[i]), i, i + 1);
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = h.vertex[i];
         if (!p->is_by_cell) kernel_numbers_gather(&p->values, h.vertex[i], out->values[i]);
@@ -63,24 +63,25 @@ SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, cons
 }
 
 /* Computes the lines of the tets' edges (c, cu, cv and bound). Also computes, for each face, the least sum of weights
- * at which a crossing of the face is accurate enough (kernel_least_weight()). */
-SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const kernel_frame *f, const kernel_tile *tile)
+ * at which a crossing of the face is accurate enough (kernel_compute_least_weight_sum()). */
+SIMD_INLINE void kernel_compute_tet_edge_lines(kernel_transformed_tets *out, const kernel_frame *f,
+                                               const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
         for (int a = 0; a < 3; a++) at[i][a] = out->at[a][i];
-        size[i] = kernel_lanes_size(f, tile, at[i]);
+        size[i] = kernel_lanes_bound_projected_position(f, tile, at[i]);
     }
     out->doubt = vf_set(0);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         vf line[3];
         kernel_lanes_edge_function(f, at[i], at[j], line);
-        kernel_lanes_edge_extent(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
+        kernel_lanes_compute_error_and_extent(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
         out->c[n] = line[0];
         out->cu[n] = line[1];
         out->cv[n] = line[2];
-        out->bound[n] = kernel_lanes_edge_error(size[i], size[j]);
+        out->bound[n] = kernel_lanes_bound_edge_function_error(size[i], size[j]);
         out->doubt = vf_max(out->doubt, out->bound[n]);
     }
     for (int n = 0; n < 4; n++) {
@@ -95,7 +96,7 @@ static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transf
                                                                    const kernel_tile *tile)
 {
     kernel_transformed_positions(out, f, tile);
-    kernel_transformed_lines(out, f, tile);
+    kernel_compute_tet_edge_lines(out, f, tile);
 }
 
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
@@ -114,7 +115,7 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
 }
 
 /* Sets all lanes to a tet in tile space, without edge functions. */
-SIMD_INLINE void kernel_transformed_tets_set(kernel_transformed_tets *out, const kernel_cell *c)
+SIMD_INLINE void kernel_set_all_lanes_to_tet(kernel_transformed_tets *out, const kernel_cell *c)
 {
     const float *const at[3] = {c->x, c->y, c->z};
     for (int i = 0; i < 4; i++) {
@@ -123,7 +124,7 @@ SIMD_INLINE void kernel_transformed_tets_set(kernel_transformed_tets *out, const
     }
 }
 
-/* Sets all lanes to a tet that has been read and sorted (kernel_cell_order()), and transforms it. */
+/* Sets all lanes to a tet that has been read and sorted (kernel_cell_sort_vertices()), and transforms it. */
 static __attribute__((noinline, unused)) void kernel_transform_single_tet(kernel_transformed_tets *out,
                                                                           const kernel_cell *c, const kernel_frame *f,
                                                                           const kernel_tile *tile)

@@ -138,7 +138,7 @@ DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 
 /* Sets the pointers to the temporary arrays of *w to consecutive parts of the buffer, and returns the size of all
  * arrays in bytes. If the buffer is NULL, only the size is computed. */
-static size_t lay_out(work *w, char *buffer)
+static size_t lay_out_work_arrays(work *w, char *buffer)
 {
     base_arena at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
     w->rank = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof(int));
@@ -155,7 +155,7 @@ static void read_faces(work *w, int64_t cell)
     closed_faces_read(c, w->g, cell);
     for (int i = 0; i < c->vertex_count; i++) {
         work_vertex *v = &w->vertices[i];
-        grid_vertex(w->g, c->vertices[i], v->position);
+        grid_read_vertex_position(w->g, c->vertices[i], v->position);
         v->value = grid_field_value(w->field, w->field->is_cell_centred ? cell : c->vertices[i]);
         v->vertex = c->vertices[i];
         v->input_index = i;
@@ -207,7 +207,7 @@ static void store_vertices(const work *w, int64_t cell, polyhedron *c)
     c->values[c->vertex_count] = c->is_constant ? c->values[0] : sum[3];
 }
 
-static bool collapses(const work *w, const int *around)
+static bool is_quad_collapsed(const work *w, const int *around)
 {
     const double *corners[4];
     /* cppcheck-suppress objectIndex ; around is four entries of a face, not one */
@@ -220,8 +220,8 @@ static void store_quads(const work *w, polyhedron *c, int *quad_of)
     int count = 0;
     for (int face = 0; face < w->faces.face_count; face++) {
         const int first = w->faces.first_entries[face];
-        const bool is_quad = closed_face_is_patch(&w->faces, face, (const double(*)[3])w->positions) &&
-                             !collapses(w, &w->faces.entry_vertices[first]);
+        const bool is_quad = closed_face_is_bilinear_patch(&w->faces, face, (const double(*)[3])w->positions) &&
+                             !is_quad_collapsed(w, &w->faces.entry_vertices[first]);
         quad_of[face] = is_quad ? count : -1;
         if (quad_of[face] >= 0) memcpy(c->quads[count++], &w->faces.entry_vertices[first], 4 * sizeof(int));
     }
@@ -232,7 +232,7 @@ static void store_facets(work *w, polyhedron *c)
     static const int ends[3][2] = {{0, 1}, {1, 2}, {0, 2}};
     int *quad_of = w->faces.stack;
     store_quads(w, c, quad_of);
-    closed_edges_empty(&w->faces);
+    closed_edges_clear(&w->faces);
     c->edge_count = 0;
     c->is_star_shaped = true;
     for (int i = 0; i < c->facet_count; i++) {
@@ -284,10 +284,10 @@ static polyhedron *store_polyhedron(polyhedron_store *store, work *w, int64_t ce
 static polyhedron *decompose_polyhedron(polyhedron_store *store, const grid *g, const grid_field *field, uint32_t index)
 {
     work w = {.g = g, .field = field};
-    if (!closed_faces_count(&w.faces, g, index)) return NULL;
-    char *buffer = ensure_buffer_size(&store->work, &store->work_bytes, lay_out(&w, NULL));
+    if (!closed_faces_count_entries(&w.faces, g, index)) return NULL;
+    char *buffer = ensure_buffer_size(&store->work, &store->work_bytes, lay_out_work_arrays(&w, NULL));
     if (!buffer) return NULL;
-    lay_out(&w, buffer);
+    lay_out_work_arrays(&w, buffer);
     read_faces(&w, index);
     closed_faces_orient(&w.faces);
     closed_faces_triangulate(&w.faces, (const double(*)[3])w.positions);

@@ -46,7 +46,7 @@ typedef struct polyhedron {
      * centre */
     float (*lines)[4];
     /* if the sum of a crossing's weights is at least this, the crossing is accurate, whichever triangle is crossed
-     * (kernel_least_weight_bound()) */
+     * (kernel_bound_least_weight_sum()) */
     float least;
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];

@@ -8,7 +8,7 @@
 
 /* Converts a candidate (a cell that may be visible in some pixels of the picture) to its form in the bin of one tile,
  * with pixels counted from (x0, y0), the tile's upper left pixel. */
-static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, int x0, int y0)
+static inline kernel_tile_candidate kernel_convert_candidate_to_tile(const kernel_candidate *c, int x0, int y0)
 {
     /* first and last column, first and last row of the cell's pixels in the tile, counted from the tile's upper left
      * pixel */
@@ -21,7 +21,7 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
                                    .far = c->far,
                                    .cell = c->cell,
                                    .source = c->source,
-                                   .blocks = (uint16_t)kernel_blocks_at(blocks[0], blocks[1]),
+                                   .blocks = (uint16_t)kernel_mask_blocks_in_columns_and_rows(blocks[0], blocks[1]),
                                    .box = (uint16_t)(ends[0] | ends[1] << 4 | ends[2] << 8 | ends[3] << 12)};
 }
 

@@ -24,9 +24,9 @@
  *
  * Positions are differences from the eye in float32, along the camera's axes. A hit is a mean of the vertices, and the
  * slab is computed from rounded vertices. The computed slab is therefore wrong by at most the error of the vertices, 8
- * roundings of their distance from the eye, which is less than the margins of kernel_add_lanes(). Also the statement
- * that cells whose map is not folded contain their hits holds only up to rounding; cells as small as the rounding error
- * lie within the margins anyway. */
+ * roundings of their distance from the eye, which is less than the margins of kernel_add_candidates_of_lanes(). Also
+ * the statement that cells whose map is not folded contain their hits holds only up to rounding; cells as small as the
+ * rounding error lie within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -62,23 +62,23 @@ typedef struct kernel_curved_lanes {
  * folded). terms: the polynomial coefficients of the three coordinates (kernel_local.h); inverse: the inverse of the
  * matrix of their linear terms. The square of the Frobenius norm (see the top of this file) must be below 0.9 instead
  * of 1, which leaves a margin far larger than all rounding errors. */
-SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
+SIMD_INLINE vm kernel_find_lanes_with_unfolded_maps(int type, const vf terms[4][8], const vf inverse[3][3])
 {
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     for (int k = 0; k < kernel_nonlinear_count(type); k++)
         for (int i = 0; i < 3; i++)
             nonlinear_part[k][i] =
                 (inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k]) + inverse[i][2] * terms[2][4 + k];
-    return vf_lt(kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
+    return vf_lt(kernel_local_bound_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
 }
 
 /* Computes the members level and thickness, which define the slab (the space between two parallel planes) that contains
  * the isosurface. |f| is at most about 1. Let r be the rounding error of one coordinate. Each coordinate of a vertex
  * has an error of at most r, and each coordinate of the vertices' average (terms[a][0]) an error of at most 8 r. Lanes
  * in which the cell's volume is near float32's minimum are removed from fitting_lanes. */
-SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
+SIMD_INLINE void kernel_curved_lanes_compute_slab_of(kernel_curved_lanes *l, int type)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     vf terms[4][8], inverse[3][3], g[3], size = vf_set(0), error = size, error_bound = size;
     for (int a = 0; a < 4; a++) {
         vf v[8];
@@ -98,7 +98,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
         }
         error = vf_max(vf_abs(l->level[i] - l->f[i]), error);
     }
-    const vm unfolded = kernel_curved_lanes_unfolded(type, (const vf(*)[8])terms, (const vf(*)[3])inverse);
+    const vm unfolded = kernel_find_lanes_with_unfolded_maps(type, (const vf(*)[8])terms, (const vf(*)[3])inverse);
     error *= vf_select(unfolded, vf_set(1), vf_set(3.4f));
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
@@ -109,16 +109,16 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
     l->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
-static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type)
+static __attribute__((noinline)) void kernel_curved_lanes_compute_slab(kernel_curved_lanes *l, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
+    KERNEL_OF_TYPE(type, kernel_curved_lanes_compute_slab_of, l);
 }
 
 /* Computes the bounds, in the picture and in depth, of that part of the cell's convex hull that lies in the slab |L| <=
  * thickness, which contains the isosurface. The part's corners are among the vertices that lie in the slab and the
  * points at which lines between two vertices cross the slab's two planes. */
 static __attribute__((noinline)) void
-kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
+kernel_curved_lanes_compute_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
     *e = kernel_view_bounds_empty();
     for (int i = 0; i < l->count; i++) {
@@ -139,8 +139,8 @@ kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lane
 
 /* Computes the bounds, in the picture and in depth, of the points on each tet's edges at which the field is the
  * isovalue. negative: for each vertex the lanes in which its value is below the isovalue, compared exactly. */
-SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l,
-                                              const vm negative[4], kernel_view_bounds *e)
+SIMD_INLINE void kernel_tet_lanes_compute_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l,
+                                                      const vm negative[4], kernel_view_bounds *e)
 {
     *e = kernel_view_bounds_empty();
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
@@ -170,11 +170,11 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
         vf place[3];
         for (int k = 0; k < 3; k++) {
             const kernel_raw_numbers world = {.wide = {cells[end][k][0], cells[end][k][1]}};
-            place[k] =
-                kernel_raw_minus(&s->arrays.coordinates[k], &world, &s->eye[k]) * (float)s->frame->job->space.scale;
+            place[k] = kernel_subtract_level_from_raw(&s->arrays.coordinates[k], &world, &s->eye[k]) *
+                       (float)s->frame->job->space.scale;
             for (int a = 0; a < 3; a++) parts[a][k][end] = place[k] * (float)axes[a][k];
         }
-        l->fitting_lanes = kernel_positions_fit_lanes(l->fitting_lanes, place);
+        l->fitting_lanes = kernel_keep_lanes_in_float_range(l->fitting_lanes, place);
     }
     for (int i = 0; i < 8; i++) {
         const float *corner = kernel_cell_shape(c->type)->corners[i];
@@ -196,20 +196,20 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
     l->fitting_lanes = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
-        kernel_finder_positions(s, kernel_cells_vertex(c, i), from_eye);
-        l->fitting_lanes = kernel_positions_fit_lanes(l->fitting_lanes, from_eye);
+        kernel_finder_read_vertex_positions(s, kernel_cells_load_vertex_indices(c, i), from_eye);
+        l->fitting_lanes = kernel_keep_lanes_in_float_range(l->fitting_lanes, from_eye);
         kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }
 
 /* Sets l->f to the values v minus the isovalue, not yet scaled, and removes lanes whose values are too large, too small
  * or NaN from l->fitting_lanes. Returns the largest |f| of each lane. */
-SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_raw_numbers *v, int count,
-                                          const kernel_level *level, kernel_curved_lanes *l)
+SIMD_INLINE vf kernel_curved_lanes_subtract_isovalue(const kernel_finder *s, const kernel_raw_numbers *v, int count,
+                                                     const kernel_level *level, kernel_curved_lanes *l)
 {
     vf size = vf_set(0);
     for (int i = 0; i < count; i++) {
-        l->f[i] = kernel_raw_minus(&s->arrays.values, &v[i], level);
+        l->f[i] = kernel_subtract_level_from_raw(&s->arrays.values, &v[i], level);
         size = vf_max(vf_abs(l->f[i]), size);
         l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
     }
@@ -224,11 +224,12 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
                                     const kernel_view_bounds *e)
 {
     const unsigned good = crossed & vm_bits(vm_and(fitting, vf_le(e->near, e->far)));
-    kernel_add_lanes(s, e, kernel_arrays_drawn_lanes(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
+    kernel_add_candidates_of_lanes(s, e, kernel_arrays_drawn_lanes(&s->arrays, c->cell, good), c->cell,
+                                   s->source + (uint32_t)value);
     for (unsigned odd = crossed & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_cell own;
         kernel_cell_fetch(&own, s->arrays.cells, &s->field->fields[s->part], c->cell[__builtin_ctz(odd)]);
-        kernel_find_surface(s, &own, value);
+        kernel_add_cell_if_crossed(s, &own, value);
     }
 }
 
@@ -241,23 +242,24 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
     const unsigned all = (1u << c->count) - 1;
     kernel_curved_lanes l;
     kernel_raw_numbers v[4];
-    for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    for (int i = 0; i < 4; i++)
+        kernel_arrays_values(&s->arrays, kernel_cells_load_vertex_indices(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, 4, &l);
     const vm fitting = l.fitting_lanes;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
-        const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
+        const kernel_level level = kernel_make_level(s->surface->layer->values[value]);
         vm negative[4], any = vm_none(), every = vm_all_lanes();
         kernel_view_bounds e;
         l.fitting_lanes = fitting;
-        kernel_curved_lanes_values(s, v, 4, &level, &l);
+        kernel_curved_lanes_subtract_isovalue(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
-            negative[i] = kernel_raw_below(&s->arrays.values, &v[i], &level);
+            negative[i] = kernel_is_raw_number_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, negative[i]);
             every = vm_and(every, negative[i]);
         }
         const unsigned crossed = all & vm_bits(vm_andnot(any, every));
         if (!crossed) continue;
-        kernel_tet_lanes_view_bounds(s, &l, negative, &e);
+        kernel_tet_lanes_compute_view_bounds(s, &l, negative, &e);
         kernel_add_crossed(s, c, value, l.fitting_lanes, crossed, &e);
     }
 }
@@ -266,39 +268,41 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* Computes the bounds of the isosurface in each cell of the list, and adds the cells to the candidates. The layer's
  * isovalue with the index c->value must cross all of these cells. */
-SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
+SIMD_INLINE void kernel_bound_and_add_crossed_cells(kernel_finder *s, const kernel_cells *c, int vertices)
 {
-    const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);
+    const kernel_level level = kernel_make_level(s->surface->layer->values[c->value]);
     kernel_curved_lanes l;
     kernel_view_bounds e;
     kernel_raw_numbers v[8];
-    for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    for (int i = 0; i < vertices; i++)
+        kernel_arrays_values(&s->arrays, kernel_cells_load_vertex_indices(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
-    const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
+    const vf size = kernel_curved_lanes_subtract_isovalue(s, v, vertices, &level, &l);
     /* the bits of a power of two that brings the largest magnitude near 1: its exponent is the negated exponent of that
      * magnitude */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
-    kernel_curved_lanes_slab(&l, c->type);
-    kernel_curved_lanes_view_bounds(s, &l, &e);
+    kernel_curved_lanes_compute_slab(&l, c->type);
+    kernel_curved_lanes_compute_view_bounds(s, &l, &e);
     kernel_add_crossed(s, c, c->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
 static __attribute__((noinline)) void kernel_process_crossed_cells(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
-    kernel_cells_fill(c);
+    kernel_cells_pad_lanes(c);
     if (c->vertices == 8)
-        kernel_crossed_process(s, c, 8);
+        kernel_bound_and_add_crossed_cells(s, c, 8);
     else
-        kernel_crossed_process(s, c, c->vertices);
+        kernel_bound_and_add_crossed_cells(s, c, c->vertices);
     c->count = 0;
 }
 
 /* Appends the cells of the given lanes (a bit mask), which the layer's isovalue with the index `value` crosses, to the
  * list s->crossed of their type. A list has cells of one isovalue; if it is full or has another isovalue, its cells are
  * processed first. */
-SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
+SIMD_INLINE void kernel_append_to_crossed_list(kernel_finder *s, const kernel_cells *from, int vertices, int value,
+                                               unsigned lanes)
 {
     kernel_cells *c = &s->crossed[kernel_lane_type_index(from->type)];
     if (lanes && value != c->value) kernel_process_crossed_cells(s, c);
@@ -312,30 +316,31 @@ SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, 
 }
 
 /* Finds the cells that have vertex values on both sides of an isovalue, and appends them to the lists s->crossed. */
-SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c, int vertices)
+SIMD_INLINE void kernel_find_cells_crossed_by_isovalues(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const render_surface_layer *layer = s->surface->layer;
     const unsigned all = (1u << c->count) - 1;
     kernel_raw_numbers v[8];
-    for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    for (int i = 0; i < vertices; i++)
+        kernel_arrays_values(&s->arrays, kernel_cells_load_vertex_indices(c, i), c->cell, &v[i]);
     for (int value = 0; value < layer->value_count; value++) {
-        const kernel_level level = kernel_level_of(layer->values[value]);
+        const kernel_level level = kernel_make_level(layer->values[value]);
         vm any = vm_none(), every = vm_all_lanes();
         for (int i = 0; i < vertices; i++) {
-            const vm below = kernel_raw_below(&s->arrays.values, &v[i], &level);
+            const vm below = kernel_is_raw_number_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, below);
             every = vm_and(every, below);
         }
-        kernel_crossed_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
+        kernel_append_to_crossed_list(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
     }
 }
 
-static __attribute__((noinline)) void kernel_find_curved(kernel_finder *s, const kernel_cells *c)
+static __attribute__((noinline)) void kernel_find_crossed_curved_cells(kernel_finder *s, const kernel_cells *c)
 {
     if (c->vertices == 8)
-        kernel_find_straddling(s, c, 8);
+        kernel_find_cells_crossed_by_isovalues(s, c, 8);
     else
-        kernel_find_straddling(s, c, c->vertices);
+        kernel_find_cells_crossed_by_isovalues(s, c, c->vertices);
 }
 
 #endif

@@ -46,24 +46,24 @@ static __attribute__((noinline)) void kernel_find_volume_cells(kernel_finder *s,
     vm fitting = vm_all_lanes();
     vf v[8] = {vf_set(0)};
     for (int i = 0; i < c->vertices; i++) {
-        const vi vertex = kernel_cells_vertex(c, i);
+        const vi vertex = kernel_cells_load_vertex_indices(c, i);
         kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_halves_narrow(value.wide);
         fitting = vm_and(fitting, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
-        kernel_finder_positions(s, vertex, place);
-        fitting = kernel_positions_fit_lanes(fitting, place);
+        kernel_finder_read_vertex_positions(s, vertex, place);
+        fitting = kernel_keep_lanes_in_float_range(fitting, place);
         kernel_rotate_to_camera(s, place, at);
         kernel_view_bounds_add(s, &e, at, vm_all_lanes());
     }
     const vm shows = kernel_visible_values_overlap_cells(s->visible_values, v, c->vertices);
     const unsigned all = (1u << c->count) - 1;
     const unsigned good = kernel_arrays_drawn_lanes(&s->arrays, c->cell, all & vm_bits(vm_and(fitting, shows)));
-    if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);
+    if (good) kernel_add_candidates_of_lanes(s, &e, good, c->cell, s->source);
     for (unsigned odd = all & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_finder_fetch_cell(s, c->cell[__builtin_ctz(odd)]);
-        kernel_find_volume(s);
+        kernel_add_cell_if_visible(s);
     }
 }
 
@@ -74,13 +74,13 @@ static __attribute__((noinline)) void kernel_find_volume_cells(kernel_finder *s,
 static void kernel_process_pending_cells(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
-    kernel_cells_fill(c);
+    kernel_cells_pad_lanes(c);
     if (!s->surface)
         kernel_find_volume_cells(s, c);
     else if (kernel_is_linear(c->type))
         kernel_find_tets(s, c);
     else
-        kernel_find_curved(s, c);
+        kernel_find_crossed_curved_cells(s, c);
     c->count = 0;
 }
 
@@ -91,11 +91,12 @@ static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, 
 {
     kernel_finder_fetch_cell(s, cell);
     if (kernel_has_own_faces(s->cell.type))
-        kernel_find_polyhedron(s, cell);
+        kernel_add_polyhedron_candidate(s, cell);
     else if (!s->surface)
-        kernel_find_volume(s);
+        kernel_add_cell_if_visible(s);
     else
-        for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_surface(s, &s->cell, value);
+        for (int value = 0; value < s->surface->layer->value_count; value++)
+            kernel_add_cell_if_crossed(s, &s->cell, value);
 }
 
 /* Moves the cells of s->queued, whose connectivity has been prefetched, to the lists s->pending, and prefetches their
@@ -113,7 +114,7 @@ static void kernel_process_queued_cells(kernel_finder *s)
         kernel_cells *c = &s->pending[kernel_lane_type_index(type)];
         if (c->count == SIMD_WIDTH) kernel_process_pending_cells(s, c);
         c->cell[c->count] = cell;
-        kernel_arrays_vertices_of_any(p, cell, c->vertices, c->vertex[0] + c->count, SIMD_WIDTH);
+        kernel_arrays_read_indices_of_any_type(p, cell, c->vertices, c->vertex[0] + c->count, SIMD_WIDTH);
         c->count++;
     }
     s->queued_count = 0;
@@ -124,7 +125,7 @@ static void kernel_queue_leaf_cells(kernel_finder *s, const uint32_t *cells, int
     const grid *g = s->arrays.cells;
     const bool is_plain = !g->offsets.data && !g->cell_types && !g->lattice;
     const char *indices = g->connectivity.data;
-    const int64_t stride = g->connectivity.stride * grid_type_vertices(g->cell_type);
+    const int64_t stride = g->connectivity.stride * grid_type_vertex_count(g->cell_type);
     for (int n = 0; n < count; n++) {
         if (s->queued_count == SIMD_WIDTH) kernel_process_queued_cells(s);
         s->queued[s->queued_count++] = cells[n];
@@ -162,8 +163,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
 /* Keeps those entries whose nodes have visible values and a box that may be visible in the picture, and returns their
  * number. An entry is 2 * node, plus 1 if the node's whole box lies in the picture. Values are tested without a branch,
  * because about half of the entries are rejected, which a processor could not predict. */
-SIMD_INLINE int kernel_front_keep_visible(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                          int64_t entries[KERNEL_FRONT], int count)
+SIMD_INLINE int kernel_keep_visible_node_entries(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                                 int64_t entries[KERNEL_FRONT], int count)
 {
     int left = 0, chosen = 0;
     for (int n = 0; n < count; n++) {
@@ -194,7 +195,7 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
         int64_t front[KERNEL_FRONT], leaves[KERNEL_FRONT], children[KERNEL_FRONT];
         int count = top < most ? top : most, leaf_count = 0, child_count = 0;
         for (int n = 0; n < count; n++) front[n] = stack[--top];
-        count = kernel_front_keep_visible(s, tree, ranges, front, count);
+        count = kernel_keep_visible_node_entries(s, tree, ranges, front, count);
         /* lists the leaves among the nodes, and the left children of the inner nodes; prefetches the leaves' cells and
          * the children's ranges of values */
         for (int n = 0; n < count; n++) {

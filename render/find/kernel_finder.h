@@ -35,12 +35,12 @@ typedef struct kernel_cells {
 static inline void kernel_cells_begin(kernel_cells *c, int type)
 {
     c->type = type;
-    c->vertices = grid_type_vertices(type);
+    c->vertices = grid_type_vertex_count(type);
     c->count = c->value = 0;
 }
 
 /* Fills the unused lanes, from `count` on, with copies of the first cell. */
-SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
+SIMD_INLINE void kernel_cells_pad_lanes(kernel_cells *c)
 {
     for (int n = c->count; n < SIMD_WIDTH; n++) {
         c->cell[n] = c->cell[0];
@@ -49,7 +49,7 @@ SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
 }
 
 /* Returns, per lane, the index in the mesh of the cell's vertex i. */
-SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
+SIMD_INLINE vi kernel_cells_load_vertex_indices(const kernel_cells *c, int i)
 {
     vi vertex;
     memcpy(&vertex, c->vertex[i], sizeof vertex);
@@ -111,10 +111,10 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         if (!kernel_is_linear(type)) kernel_cells_begin(&s->crossed[i], type);
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    kernel_tree_planes(&s->planes, f, NULL);
+    kernel_compute_planes_for_tree_boxes(&s->planes, f, NULL);
     const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
     s->t_near = (float)-f->depth_shift;
-    for (int a = 0; a < 3; a++) s->eye[a] = kernel_level_of(f->job->camera.eye[a]);
+    for (int a = 0; a < 3; a++) s->eye[a] = kernel_make_level(f->job->camera.eye[a]);
     s->column_scale = (float)(1 / (f->slope_dx * unit));
     s->row_scale = (float)(1 / (f->slope_dy * unit));
     s->column_0 = (float)(-f->slope_x0 / f->slope_dx);
@@ -131,20 +131,20 @@ typedef struct kernel_view_bounds {
 } kernel_view_bounds;
 
 /* Reads one vertex per lane and computes its position relative to the eye, in scaled units along the world axes. */
-SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf out[3])
+SIMD_INLINE void kernel_finder_read_vertex_positions(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
     for (int a = 0; a < 3; a++) {
         const kernel_numbers *c = &s->arrays.coordinates[a];
         kernel_raw_numbers world;
         kernel_numbers_gather_raw(c, vertex, &world);
-        out[a] = kernel_raw_minus(c, &world, &s->eye[a]) * (float)job->space.scale;
+        out[a] = kernel_subtract_level_from_raw(c, &world, &s->eye[a]) * (float)job->space.scale;
     }
 }
 
 /* Returns those of the lanes in `fitting` in which no coordinate is NaN or too large for computations in float32. The
  * cells of all other lanes are tested one by one. */
-SIMD_INLINE vm kernel_positions_fit_lanes(vm fitting, const vf place[3])
+SIMD_INLINE vm kernel_keep_lanes_in_float_range(vm fitting, const vf place[3])
 {
     for (int a = 0; a < 3; a++) fitting = vm_and(fitting, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return fitting;
@@ -197,8 +197,8 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound
 /* Adds the cells of the given lanes (a bit mask) to the candidates, unless they are outside the picture or behind the
  * eye's plane. e: bounds of each lane's cell. A cell that extends to near the eye's plane or behind it may be visible
  * anywhere, so its candidate covers the whole picture. */
-static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes, const uint32_t *cells,
-                             uint32_t source)
+static void kernel_add_candidates_of_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes,
+                                           const uint32_t *cells, uint32_t source)
 {
     const render_camera *camera = &s->frame->job->camera;
     const bool flat = camera->is_orthographic;
@@ -247,7 +247,7 @@ SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t v
     const double *eye = s->frame->job->camera.eye;
     double world[3];
     vf at[3];
-    grid_vertex(s->arrays.cells, vertex, world);
+    grid_read_vertex_position(s->arrays.cells, vertex, world);
     for (int a = 0; a < 3; a++) {
         const double *axis = s->frame->scaled_axes[a];
         at[a] = vf_set(
@@ -257,34 +257,35 @@ SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t v
 }
 
 /* Adds a polyhedron to the candidates, with the pixels of the bounding box of its vertices. */
-static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
+static void kernel_add_polyhedron_candidate(kernel_finder *s, uint32_t index)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
     grid_walk walk = grid_walk_cell(s->arrays.cells, index);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) kernel_view_bounds_add_vertex(s, vertex, &e);
-    kernel_add_lanes(s, &e, 1, &index, s->source);
+    kernel_add_candidates_of_lanes(s, &e, 1, &index, s->source);
 }
 
 /* Adds the fetched cell c to the candidates, with the pixels of the bounding box of its vertices. */
-static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, const kernel_cell *c, uint32_t source)
+static __attribute__((noinline)) void kernel_add_cell_candidate(kernel_finder *s, const kernel_cell *c, uint32_t source)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
     for (int i = 0; i < c->count; i++) kernel_view_bounds_add_vertex(s, c->vertices[i], &e);
-    kernel_add_lanes(s, &e, 1, &c->index, source);
+    kernel_add_candidates_of_lanes(s, &e, 1, &c->index, source);
 }
 
 /* Adds the fetched cell c to the candidates if it is crossed by the layer's isovalue with the index `value`. */
-SIMD_INLINE void kernel_find_surface(kernel_finder *s, const kernel_cell *c, int value)
+SIMD_INLINE void kernel_add_cell_if_crossed(kernel_finder *s, const kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
-        kernel_add_cell_box(s, c, s->source + (uint32_t)value);
+        kernel_add_cell_candidate(s, c, s->source + (uint32_t)value);
 }
 
 /* Adds the fetched cell s->cell to the candidates if its values are visible in the volume. */
-SIMD_INLINE void kernel_find_volume(kernel_finder *s)
+SIMD_INLINE void kernel_add_cell_if_visible(kernel_finder *s)
 {
-    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer))
+        kernel_add_cell_candidate(s, &s->cell, s->source);
 }
 
 #endif

@@ -11,7 +11,7 @@
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;
-    const int64_t first = kernel_arrays_first_entry(g, cell, grid_type_vertices(g->cell_type));
+    const int64_t first = kernel_arrays_find_connectivity_entry(g, cell, grid_type_vertex_count(g->cell_type));
     __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
 }
@@ -19,11 +19,11 @@ SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 /* Prefetches the coordinates and values of a cell's vertices; polyhedra are skipped. */
 SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
 {
-    const int vertices = grid_type_vertices(grid_cell_type(g, cell));
-    const int64_t first = kernel_arrays_first_entry(g, cell, vertices);
+    const int vertices = grid_type_vertex_count(grid_cell_type(g, cell));
+    const int64_t first = kernel_arrays_find_connectivity_entry(g, cell, vertices);
     for (int i = 0; i < vertices; i++) {
         const int64_t v =
-            g->lattice ? first + g->lattice->corner_offsets[i] : grid_array_index(&g->connectivity, first + i);
+            g->lattice ? first + g->lattice->corner_offsets[i] : grid_read_index(&g->connectivity, first + i);
         __builtin_prefetch(field->values.data + v * field->values.stride);
         for (int a = 0; a < 3 && g->coordinates[a].data; a++)
             __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);

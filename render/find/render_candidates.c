@@ -95,14 +95,15 @@ static void bins_free(struct kernel_bins *bins)
 
 /* Goes through the candidates of all chunks and increases at[tile] by 1 for each tile in which a candidate may be
  * visible. If `out` is not NULL, at[tile] is the index at which the tile's next candidate is stored in `out`. */
-static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
+static void bin_candidates_by_tile(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at,
+                                   kernel_tile_candidate *out)
 {
     for (; chunk; chunk = chunk->before)
         for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
             for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
                 for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++) {
                     const uint32_t n = at[y * across + x]++;
-                    if (out) out[n] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
+                    if (out) out[n] = kernel_convert_candidate_to_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
                 }
 }
 
@@ -112,18 +113,18 @@ static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, in
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
-    bin_tiles(bin->list.chunk, across, starts + 1, NULL);
+    bin_candidates_by_tile(bin->list.chunk, across, starts + 1, NULL);
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        /* index of the tile's first candidate; the second call of bin_tiles() increases it to that of the next tile's
-         * first candidate */
+        /* index of the tile's first candidate; the second call of bin_candidates_by_tile() increases it to that of the
+         * next tile's first candidate */
         starts[1 + tile] = (uint32_t)sum;
         sum += count;
     }
     if (sum > (uint64_t)most) return false;
     bin->items = base_alloc(sum * sizeof *bin->items);
     if (!bin->items) return false;
-    bin_tiles(bin->list.chunk, across, starts + 1, bin->items);
+    bin_candidates_by_tile(bin->list.chunk, across, starts + 1, bin->items);
     return true;
 }
 
@@ -143,7 +144,7 @@ static int count_candidates_in_tile(const struct kernel_bins *bins, int64_t tile
 
 /* Gathers a tile's candidates in *bin. If a single thread has found all of them, bin->items points to that thread's
  * bins; otherwise they are copied to bin->buffer. Returns false if there is no memory. */
-static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
+static bool gather_tile_candidates(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
 {
     const struct kernel_bins *last = NULL;
     int64_t count = 0;
@@ -170,7 +171,8 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0)
 {
     const int64_t tile = y0 / KERNEL_TILE * tiles_across(frame) + x0 / KERNEL_TILE;
-    return gather(frame->candidates, tile, &thread->bin) && gather(frame->volume_candidates, tile, &thread->volume_bin);
+    return gather_tile_candidates(frame->candidates, tile, &thread->bin) &&
+           gather_tile_candidates(frame->volume_candidates, tile, &thread->volume_bin);
 }
 
 /* ---- numbers of cells per pixel, and bounding boxes in the picture -------------------------------------------- */
@@ -178,7 +180,7 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
 /* Extends the ranges of pixel columns (from spans[0][0] to spans[0][1]) and of rows (spans[1]) so that they contain a
  * point, which is given in the trees' coordinates. Returns the point's depth from the eye, or 1 if the camera is
  * orthographic. */
-static double widen(const kernel_frame *f, const double point[3], double spans[2][2])
+static double extend_spans_by_point(const kernel_frame *f, const double point[3], double spans[2][2])
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
@@ -198,9 +200,9 @@ static double widen(const kernel_frame *f, const double point[3], double spans[2
     return depth;
 }
 
-/* Extends the ranges of columns and rows (widen()) by all corners of the tree's bounding box. Returns the smallest
- * depth of a corner. */
-static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spans[2][2])
+/* Extends the ranges of columns and rows (extend_spans_by_point()) by all corners of the tree's bounding box. Returns
+ * the smallest depth of a corner. */
+static double extend_spans_by_tree_box(const kernel_frame *f, const mmbvh *tree, double spans[2][2])
 {
     float lower[4], upper[4];
     double least = INFINITY;
@@ -208,7 +210,7 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spa
     for (int corner = 0; corner < 8; corner++) {
         double point[3];
         for (int a = 0; a < 3; a++) point[a] = (double)(corner >> a & 1 ? upper[a] : lower[a]);
-        least = fmin(widen(f, point, spans), least);
+        least = fmin(extend_spans_by_point(f, point, spans), least);
     }
     return least;
 }
@@ -227,7 +229,7 @@ static bool measure_parts_in_picture(const kernel_frame *f, const mmbvh_ranges *
         const mmbvh *tree = f->job->parts[part].tree;
         double own[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
         if ((ranges && !ranges[part].low) || !tree->node_count) continue;
-        if (!(widen_by_tree(f, tree, own) > 0)) return false;
+        if (!(extend_spans_by_tree_box(f, tree, own) > 0)) return false;
         for (int a = 0; a < 2; a++) {
             all[a][0] = fmin(own[a][0], all[a][0]);
             all[a][1] = fmax(own[a][1], all[a][1]);
@@ -251,8 +253,8 @@ static bool volume_cells_are_small(const kernel_frame *f)
 /* Visits `samples` nodes that are spread evenly over the part's tree, and counts the cells in those that are leaves.
  * Adds the number of these cells to *cells. For each isovalue, adds to *crossed the number of cells in leaves whose
  * range of values contains the isovalue. About half of the nodes are leaves. */
-static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, double *cells,
-                          double *crossed)
+static void count_cells_in_sampled_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples,
+                                          double *cells, double *crossed)
 {
     const mmbvh *tree = f->job->parts[part].tree;
     const mmbvh_ranges *ranges = &s->layer->field.ranges[part];
@@ -289,8 +291,8 @@ bool render_surfaces_are_small(const kernel_frame *f)
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
-            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / cells)), &sampled,
-                          &sampled_crossed);
+            count_cells_in_sampled_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / cells)), &sampled,
+                                          &sampled_crossed);
             own += held;
         }
         if (sampled > 0) crossed += sampled_crossed / sampled * own;
@@ -299,16 +301,17 @@ bool render_surfaces_are_small(const kernel_frame *f)
 }
 
 /* The rectangle of pixels in frame->cover contains the projections of all trees' bounding boxes. It is extended by a
- * margin that covers the errors of rays and tree bounds for which kernel_tree_planes() allows, and the half pixel by
- * which a pixel extends beyond its centre. */
-void render_trees_cover(kernel_frame *f)
+ * margin that covers the errors of rays and tree bounds for which kernel_compute_planes_for_tree_boxes() allows, and
+ * the half pixel by which a pixel extends beyond its centre. */
+void render_compute_tree_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
     const int most[2] = {job->camera.width - 1, job->camera.height - 1};
     double spans[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     double least = INFINITY, size = 2;
     for (int part = 0; part < job->part_count; part++)
-        if (job->parts[part].tree->node_count) least = fmin(widen_by_tree(f, job->parts[part].tree, spans), least);
+        if (job->parts[part].tree->node_count)
+            least = fmin(extend_spans_by_tree_box(f, job->parts[part].tree, spans), least);
     for (int a = 0; a < 3; a++)
         size = fmax(2 + fabs((job->camera.eye[a] - job->space.origin[a]) * job->space.scale), size);
     for (int a = 0; a < 2; a++) {
@@ -324,8 +327,8 @@ void render_trees_cover(kernel_frame *f)
 /* Searches all subtrees in parallel. As soon as no subtree is left, each thread sorts its own candidates by tile,
  * without waiting for the other threads. most: maximum number of candidates that a thread may store in its bins; a
  * candidate counts once for each of its tiles. */
-static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count, struct kernel_bins *bins,
-                int64_t most, kernel_thread *thread_of, int threads)
+static void search_subtrees_in_parallel(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count,
+                                        struct kernel_bins *bins, int64_t most, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
     const int64_t tiles = tile_count(frame);
@@ -377,7 +380,8 @@ static bool is_complete(const struct kernel_bins *bins, int64_t tiles, int64_t m
 
 /* Returns the binned candidates of all surfaces or, if is_volume is set, of the volume; NULL if there are too many or
  * memory runs out. */
-static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads)
+static struct kernel_bins *find_and_bin_candidates(kernel_frame *frame, bool is_volume, kernel_thread *thread_of,
+                                                   int threads)
 {
     const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
@@ -387,7 +391,7 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
     struct kernel_bins *bins = begin_bins(frame, &bound, threads);
     kernel_subtree *subtrees = render_subtrees(frame, is_volume ? -1 : 0, is_volume ? 0 : frame->surface_count, &count);
     const bool is_begun = bins && subtrees;
-    if (is_begun) run(frame, subtrees, count, bins, most, thread_of, threads);
+    if (is_begun) search_subtrees_in_parallel(frame, subtrees, count, bins, most, thread_of, threads);
     base_free(subtrees);
     if (!is_begun || !is_complete(bins, tile_count(frame), most)) {
         bins_free(bins);
@@ -399,13 +403,13 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
 
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    frame->candidates = find(frame, false, thread_of, threads);
+    frame->candidates = find_and_bin_candidates(frame, false, thread_of, threads);
 }
 
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
     if (volume_cells_are_small(frame)) return;
-    frame->volume_candidates = find(frame, true, thread_of, threads);
+    frame->volume_candidates = find_and_bin_candidates(frame, true, thread_of, threads);
 }
 
 void render_candidates_free(kernel_frame *frame)

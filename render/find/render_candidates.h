@@ -21,7 +21,7 @@ void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of
  * surfaces in thread->bin, those of the volume in thread->volume_bin. Returns false if there is no memory. */
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
 /* Sets frame->cover to a rectangle of pixels outside which no tree's bounding box is visible. */
-void render_trees_cover(kernel_frame *frame);
+void render_compute_tree_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);
 
 #endif

@@ -44,8 +44,8 @@ SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
 
 /* Sets up a packet of the bundle's rays `first` to `first` + SIMD_WIDTH - 1. Only rays whose bit in b->open is set are
  * active. */
-static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
-                                        const kernel_bundle *b, int first)
+static inline void kernel_packet_set_up_from_bundle(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
+                                                    const kernel_bundle *b, int first)
 {
     const int left = b->count - first, count = left < SIMD_WIDTH ? left : SIMD_WIDTH;
     p->frame = f;

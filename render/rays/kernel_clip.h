@@ -139,7 +139,8 @@ static inline bool kernel_clip_contains(const render_clip *c, const render_space
 }
 
 /* Returns whether all of the clips keep the ray's point at t. clips: one bit per clip of the job. */
-static inline bool kernel_clip_keeps(const render_job *job, uint32_t clips, const kernel_clip_ray *ray, double t)
+static inline bool kernel_clips_keep_ray_point(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
+                                               double t)
 {
     for (; clips; clips &= clips - 1) {
         const render_clip *c = &job->clips[__builtin_ctz(clips)];

@@ -205,7 +205,7 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
 
 /* Computes colours from a table that has bands of constant colour, or separate colours for NaN and for values outside
  * the table's range. w: the values, in the transfer function's domain. */
-static __attribute__((noinline)) void kernel_special_colour(const kernel_transfer *t, vf w, vf out[3])
+static __attribute__((noinline)) void kernel_compute_banded_or_outside_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_find_colour_table_position(t, w), one = vf_set(1), zero = vf_set(0);
     if (t->is_banded) {
@@ -229,7 +229,7 @@ static __attribute__((noinline)) void kernel_special_colour(const kernel_transfe
 SIMD_INLINE void kernel_unlit_surface_colour(const kernel_surface *s, vi value, vf w, vf out[3])
 {
     if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
-        kernel_special_colour(&s->colour, w, out);
+        kernel_compute_banded_or_outside_colour(&s->colour, w, out);
         return;
     }
     if (s->layer->colour_map) {

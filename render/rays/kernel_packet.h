@@ -59,7 +59,8 @@ enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIM
 /* Computes a ray in the scaled world coordinates that kernel_types.h calls tree space: its point at t is base + t *
  * direction. px, py: slope (perspective) or offset (orthographic) of the ray's column and row of pixels
  * (kernel_column_slope(), kernel_row_slope()). */
-static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
+static inline void kernel_compute_scaled_world_ray(const kernel_frame *f, double px, double py, double base[3],
+                                                   double direction[3])
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
@@ -74,7 +75,8 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 
 /* Computes, for each ray of a packet, the slope (perspective) or offset (orthographic) of its column (px) and of its
  * row (py) of pixels. */
-static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
+static inline void kernel_packet_compute_pixel_slopes(const kernel_packet *p, double px[SIMD_WIDTH],
+                                                      double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
         px[i] = kernel_column_slope(p->frame, p->column[i]);
@@ -89,7 +91,7 @@ SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi i
 }
 
 /* Sets the rays of the packet whose upper left pixel is (x0, y0), and their pixels' columns and rows. */
-static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
+static inline void kernel_packet_set_rays_of_tile(kernel_packet *p, int x0, int y0)
 {
     const kernel_tile *tile = p->tile;
     const vi column = vi_lanes() & (KERNEL_PACKET_COLUMNS - 1), row = vi_lanes() / KERNEL_PACKET_COLUMNS;
@@ -104,7 +106,7 @@ static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
 
 /* Sets the indices of the packet's pixels in the image from their columns and rows, and makes those rays active whose
  * pixels lie in the image and are traced. */
-static inline void kernel_packet_pixels(kernel_packet *p, int x0, int y0)
+static inline void kernel_packet_set_pixels(kernel_packet *p, int x0, int y0)
 {
     typedef uint32_t kernel_lane_pixels __attribute__((vector_size(SIMD_WIDTH * 4)));
     const render_job *job = p->frame->job;
@@ -133,7 +135,7 @@ static inline void kernel_packet_set_view(kernel_packet *p)
         p->view[2] = vf_set(-1);
         return;
     }
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_compute_pixel_slopes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         square[i] = (float)(1 + px[i] * px[i] + py[i] * py[i]);
         x[i] = (float)px[i];
@@ -158,7 +160,7 @@ static inline void kernel_packet_set_samples(kernel_packet *p)
     const kernel_frame *f = p->frame;
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float base[SIMD_WIDTH], step[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_compute_pixel_slopes(p, px, py);
     p->sample_first = kernel_first_sample_number(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const bool flat = f->job->camera.is_orthographic;
@@ -181,10 +183,10 @@ static __attribute__((noinline, cold)) void kernel_packet_set_clip_interval(kern
     const kernel_frame *f = p->frame;
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float from[SIMD_WIDTH], to[SIMD_WIDTH], stretch[SIMD_WIDTH];
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_compute_pixel_slopes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         kernel_clip_ray ray;
-        kernel_tree_ray(f, px[i], py[i], ray.base, ray.direction);
+        kernel_compute_scaled_world_ray(f, px[i], py[i], ray.base, ray.direction);
         const kernel_ray_part part = kernel_clip_find_interval(f->job, clips, &ray, -f->depth_shift, number);
         const double length = part.end - part.begin;
         from[i] = (float)part.begin;
@@ -222,8 +224,8 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int number)
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
 }
 
-/* Sets up the packet whose upper left pixel is (x0, y0). kernel_tile_rays() must have been called for the tile. Members
- * for shading and samples are not set. */
+/* Sets up the packet whose upper left pixel is (x0, y0). kernel_tile_compute_rays() must have been called for the tile.
+ * Members for shading and samples are not set. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
@@ -232,8 +234,8 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     p->tile = tile;
     p->thread = thread;
     p->has_view = p->is_nearer = false;
-    kernel_packet_tile_rays(p, x0, y0);
-    kernel_packet_pixels(p, x0, y0);
+    kernel_packet_set_rays_of_tile(p, x0, y0);
+    kernel_packet_set_pixels(p, x0, y0);
     p->is_pencil = true;
     p->u = is_orthographic ? p->origin_x : p->slope_x;
     p->v = is_orthographic ? p->origin_y : p->slope_y;

@@ -49,7 +49,7 @@ static inline double kernel_slope_to_origin(const kernel_frame *f)
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
 }
 
-static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
+static inline void kernel_tile_compute_rays(kernel_tile *tile, const kernel_frame *f)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
@@ -144,7 +144,8 @@ static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KE
  * kernel_types.h). The planes are those of the tile's block borders, or of the whole picture if tile is NULL. Normals
  * are rounded before the offsets are computed, so that the planes still pass through the eye. The remaining error is a
  * rotation of the planes about the eye by the rounding of the normals. */
-static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+static inline void kernel_compute_planes_for_tree_boxes(kernel_planes *q, const kernel_frame *f,
+                                                        const kernel_tile *tile)
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
@@ -176,7 +177,7 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
  * distance of a position from the plane of a border between columns is X - slope * Z - origin, where slope and origin
  * are those of the border. For borders between rows it is slope * Z + origin - Y. The lane of the distance along the
  * tile's middle ray is not used. */
-static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+static inline void kernel_compute_planes_for_cells(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
@@ -212,7 +213,7 @@ typedef struct kernel_placement {
 /* Sets the bits of one vector of planes in the masks `below` and `above` of the placement. v: index of the vector; low,
  * high: the body's least and greatest signed distance from each plane. If the vector has the lane of depths, `near` and
  * `far` are set too. */
-SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low, vf high)
+SIMD_INLINE void kernel_placement_set_plane_bits(kernel_placement *placement, int v, vf low, vf high)
 {
     placement->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
     placement->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
@@ -226,7 +227,7 @@ SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low
 SIMD_INLINE void kernel_placement_find_blocks(kernel_placement *placement)
 {
     const unsigned inner = placement->above & placement->below >> 1;
-    placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
+    placement->blocks = kernel_mask_blocks_in_columns_and_rows(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
 /* Computes the least and the greatest signed distance of a node's box from each plane, and from these the blocks in
@@ -242,7 +243,7 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
         const vf at =
             (q->normal[0][v] * middle[0] + q->normal[1][v] * middle[1]) + (q->normal[2][v] * middle[2] + q->offset[v]);
         const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
-        kernel_placement_add(&placement, v, at - reach, at + reach);
+        kernel_placement_set_plane_bits(&placement, v, at - reach, at + reach);
         if (v == KERNEL_ALONG_LANE / SIMD_WIDTH) placement.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
     }
     kernel_placement_find_blocks(&placement);
@@ -271,7 +272,8 @@ SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, con
             high = vf_max(high, at);
         }
         const vf size = (q->size[0][v] * most[0] + q->size[1][v] * most[1]) + (q->size[2][v] * most[2] + q->error[v]);
-        kernel_placement_add(&placement, v, low - size * KERNEL_OUTLINE_PAD, high + size * KERNEL_OUTLINE_PAD);
+        kernel_placement_set_plane_bits(&placement, v, low - size * KERNEL_OUTLINE_PAD,
+                                        high + size * KERNEL_OUTLINE_PAD);
     }
     kernel_placement_find_blocks(&placement);
     return placement;

@@ -51,10 +51,10 @@ SIMD_INLINE unsigned kernel_blocks_not_hidden_at(const kernel_tile_trace *t, flo
     return bits;
 }
 
-SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
+SIMD_INLINE void kernel_block_set_up_packets(kernel_tile_trace *t, int block)
 {
     if (t->begun >> block & 1) return;
-    if (!t->begun) kernel_tile_rays(&t->tile, t->frame);
+    if (!t->begun) kernel_tile_compute_rays(&t->tile, t->frame);
     t->begun |= 1u << block;
     const int x = t->tile.x0 + block % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK;
     const int y = t->tile.y0 + block / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK;
@@ -149,8 +149,8 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
         const int column = i % KERNEL_TILE / KERNEL_BLOCK, row = i / KERNEL_TILE / KERNEL_BLOCK;
         t->pixel_far[i] = wanted >> (row * KERNEL_BLOCKS_ACROSS + column) & 1 ? INFINITY : -INFINITY;
     }
-    kernel_tree_planes(&t->tree_planes, f, &t->tile);
-    kernel_tile_planes(&t->tile_planes, f, &t->tile);
+    kernel_compute_planes_for_tree_boxes(&t->tree_planes, f, &t->tile);
+    kernel_compute_planes_for_cells(&t->tile_planes, f, &t->tile);
 }
 
 /* A node on the stack of a tile that traverses a tree. There are two traversals. In the traversal by blocks, `place` is
@@ -231,7 +231,7 @@ typedef struct kernel_pixel_list {
     uint8_t pixel[KERNEL_LIST_ROOM], lane[KERNEL_LIST_ROOM];
 } kernel_pixel_list;
 
-SIMD_INLINE int kernel_box_pixels(unsigned box)
+SIMD_INLINE int kernel_count_pixels_in_box(unsigned box)
 {
     const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
     return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
@@ -349,7 +349,7 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
 
 /* Returns the depths at which the rays begin. They differ only if the frame has clips that apply to all layers
  * (kernel_frame.common_clips). */
-SIMD_INLINE vf kernel_lane_rays_near(const kernel_tile_trace *t, const kernel_lane_rays *r)
+SIMD_INLINE vf kernel_lane_rays_get_begin_depths(const kernel_tile_trace *t, const kernel_lane_rays *r)
 {
     if (__builtin_expect(t->frame->common_clips == 0, 1)) return vf_set(t->t_near);
     return kernel_gather_packet_member(&t->packets[0].t_near, r->at);
@@ -370,7 +370,7 @@ SIMD_INLINE int kernel_packet_of_pixel(int pixel)
 }
 
 /* Returns, for each ray of a packet, its position among the rays of the tile's packets (kernel_pixel_position()). */
-SIMD_INLINE vi kernel_packet_places(int packet)
+SIMD_INLINE vi kernel_list_positions_in_packet(int packet)
 {
     return packet * SIMD_WIDTH + vi_lanes();
 }
@@ -380,7 +380,7 @@ SIMD_INLINE vi kernel_packet_places(int packet)
 SIMD_INLINE void kernel_lane_rays_of_packet(kernel_lane_rays *out, const kernel_tile_trace *t, int packet, int lane)
 {
     const kernel_packet *p = &t->packets[packet];
-    out->at = kernel_packet_places(packet);
+    out->at = kernel_list_positions_in_packet(packet);
     out->lane = vi_set(lane);
     out->rays = kernel_packet_rays(p);
     out->active = p->active;

@@ -144,8 +144,8 @@ typedef struct kernel_pieces {
     kernel_real bin_first[KERNEL_PIECE_BINS];
     /* A table of KERNEL_VARIATION_WIDTHS rows and KERNEL_VARIATION_BINS columns, row by row, with upper bounds over
      * ranges of values (KERNEL_LIGHT_VARIATION and so on). The row is chosen by the width of the range, and the column
-     * by the bin in which the range begins (kernel_light_bounds()). The bins of this table have the width 1 /
-     * variation_inverse, and the first begins at bin_low. */
+     * by the bin in which the range begins (kernel_look_up_light_error_bounds()). The bins of this table have the width
+     * 1 / variation_inverse, and the first begins at bin_low. */
     float variation_inverse;
     float (*variations)[KERNEL_LIGHT_ENTRIES];
     /* Set if the opacity rises or falls so steeply that the rounding of a piece's ends to kernel_real would be visible.
@@ -162,7 +162,7 @@ typedef struct kernel_pieces {
 
 /* Returns the value at which the piece below a step of the opacity ends and the piece above it begins: the value of the
  * step, rounded to kernel_real. */
-static inline float kernel_rounded_step(double step)
+static inline float kernel_round_opacity_step(double step)
 {
     return (float)(kernel_real)step;
 }
@@ -281,7 +281,7 @@ typedef struct kernel_bin {
 
 /* Returns a mask of the blocks that lie both in one of the given columns and in one of the given rows of blocks.
  * columns, rows: masks with one bit for each column or row. */
-static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
+static inline unsigned kernel_mask_blocks_in_columns_and_rows(unsigned columns, unsigned rows)
 {
     /* spread[rows] is a mask that has, for each row in the mask `rows`, the bit of the row's first block */
     static const uint16_t spread[1 << KERNEL_TILE / KERNEL_BLOCK] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
@@ -397,7 +397,7 @@ typedef struct kernel_thread {
  * out. */
 bool render_reserve_fragments(fragment_list *list, int64_t more); /* ensures space for `more` more fragments */
 bool render_grow_pending(render_pending_list *list);
-double render_seconds(void); /* a clock */
+double render_read_clock(void); /* a clock */
 
 struct kernel_bundle;
 struct kernel_occluder;

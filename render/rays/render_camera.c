@@ -62,7 +62,7 @@ void render_camera_sample(int count, int k, double offset[2])
 }
 
 /* Returns a bijective hash of 32 bits, made of two rounds of multiplying and shifting. */
-static uint32_t mix(uint32_t h)
+static uint32_t hash_integer(uint32_t h)
 {
     h ^= h >> 16;
     h *= 0x21f0aaadu;
@@ -74,5 +74,5 @@ static uint32_t mix(uint32_t h)
 
 double render_jitter(uint32_t pixel, uint32_t frame)
 {
-    return (mix(mix(pixel) + 0x9e3779b9u * (frame + 1)) >> 8) * (1.0 / 16777216.0);
+    return (hash_integer(hash_integer(pixel) + 0x9e3779b9u * (frame + 1)) >> 8) * (1.0 / 16777216.0);
 }

@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_compute_barycentric(const double corner[4][3], const dou
 
 /* Returns the value of the polynomial with the coefficients c at the reference coordinates r, for one point in double;
  * kernel_polynomial_value() does the same for vectors. */
-SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
+SIMD_INLINE double kernel_evaluate_polynomial_in_double(const double c[8], bool is_pyramid, const double r[3])
 {
     double m = r[0] * r[1];
     if (is_pyramid) {
@@ -109,7 +109,8 @@ SIMD_INLINE void kernel_interpolate_gradient(const kernel_cell *c, double (*cons
                                              const double place[3], float out[3])
 {
     if (!kernel_is_linear(c->type)) {
-        for (int k = 0; k < 3; k++) out[k] = (float)kernel_polynomial_at(gradient[k], kernel_has_apex(c->type), place);
+        for (int k = 0; k < 3; k++)
+            out[k] = (float)kernel_evaluate_polynomial_in_double(gradient[k], kernel_has_apex(c->type), place);
         return;
     }
     double corner[4][3], share[4];
@@ -186,8 +187,8 @@ SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3],
 /* Stores numbers in place of the hits' colours. RENDER_NORMALS: the unit normal in world axes. RENDER_VALUES: the first
  * component already holds the hit's value; the second becomes the index of the isovalue among all isovalues of the
  * frame. */
-static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
-                                                                 vf colour[3])
+static __attribute__((noinline, cold)) void kernel_store_numbers_as_colours(const kernel_packet *p, const vf normal[3],
+                                                                            vf kind, vf colour[3])
 {
     if (p->frame->job->paint == RENDER_VALUES) {
         colour[1] = kind - (float)FRAGMENT_SURFACE;
@@ -200,8 +201,8 @@ static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_pa
 /* For hits that are lit later (RENDER_UNLIT), stores the unit normals in the fragments' members t_out and
  * transmittance. For that, a normal is projected to the octahedron |x| + |y| + |z| = 1, whose lower half is folded over
  * the upper one (Meyer et al. 2010). */
-static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
-                                                         kernel_fragments *f)
+static __attribute__((noinline)) void kernel_store_normals_of_unlit_hits(const kernel_packet *p, const vf normal[3],
+                                                                         kernel_fragments *f)
 {
     vf n[3];
     kernel_world_normal(p, normal, n);
@@ -216,8 +217,8 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
 /* Computes the fragments' colours as the job's `paint` requests: lit, unlit together with the normal, or numbers in
  * place of colours. kind: the fragments' kind, as a float. A surface whose material takes no light gets its final
  * colour here even if the job's surfaces are lit later (RENDER_UNLIT). */
-SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
-                              kernel_fragments *f)
+SIMD_INLINE void kernel_compute_fragment_colours(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
+                                                 kernel_fragments *f)
 {
     const render_paint paint = p->frame->job->paint;
     kernel_packet_set_view(p);
@@ -225,9 +226,9 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         (paint == RENDER_UNLIT && !render_takes_light(&s->layer->material)))
         kernel_shade(p, &s->layer->material, normal, f->colour);
     else if (paint == RENDER_UNLIT)
-        kernel_paint_unlit(p, normal, f);
+        kernel_store_normals_of_unlit_hits(p, normal, f);
     else
-        kernel_paint_numbers(p, normal, kind, f->colour);
+        kernel_store_numbers_as_colours(p, normal, kind, f->colour);
 }
 
 /* Hits on a surface, one ray per lane. All cells that are hit are of one mesh part. */
@@ -261,12 +262,12 @@ SIMD_INLINE vf kernel_hit_kinds(const kernel_surface *s, const kernel_surface_hi
 /* Emits each tied hit (a hit with the same depth as its ray's nearest hit) as a fragment of its own. Tied hits occur if
  * a cell's map from reference coordinates is folded (not one-to-one). Compositing compares the bits of fragments of
  * equal depth to select one of them, so that the order of cells does not matter. */
-static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, vm tied,
-                                                             const kernel_surface_hits *h)
+static __attribute__((noinline, cold)) void kernel_emit_hits_of_equal_depth(kernel_packet *p, const kernel_surface *s,
+                                                                            vm tied, const kernel_surface_hits *h)
 {
     const vf kind = kernel_hit_kinds(s, h);
     kernel_fragments lit = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, vf_set(0), kind};
-    kernel_paint(p, s, h->normal, kind, &lit);
+    kernel_compute_fragment_colours(p, s, h->normal, kind, &lit);
     kernel_append_fragments(p, tied, 0, &lit);
 }
 
@@ -300,7 +301,7 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
 
 /* Returns the value of the field that colours the surface, in that field's units. If there is no colour field, returns
  * the isovalue. w: the value in the domain of the colour field's transfer function; value: index of the isovalue. */
-SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, vi value, vf w)
+SIMD_INLINE vf kernel_compute_displayed_value(const kernel_surface *s, vi value, vf w)
 {
     vf isovalue;
     if (s->layer->colour_map) return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
@@ -309,7 +310,7 @@ SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, vi value, vf w)
 }
 
 /* Returns the rays on which the field minus the isovalue has different signs at the two ends of the interval. */
-SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
+SIMD_INLINE vm kernel_interval_changes_sign(const kernel_interval *i)
 {
     return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
@@ -327,12 +328,12 @@ static __attribute__((noinline, cold)) vm kernel_hits_kept_by_clips(const kernel
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     unsigned kept = 0;
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_compute_pixel_slopes(p, px, py);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         kernel_clip_ray ray;
-        kernel_tree_ray(p->frame, px[i], py[i], ray.base, ray.direction);
-        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)t[i]) << i;
+        kernel_compute_scaled_world_ray(p->frame, px[i], py[i], ray.base, ray.direction);
+        kept |= (unsigned)kernel_clips_keep_ray_point(p->frame->job, clips, &ray, (double)t[i]) << i;
     }
     return vm_from_bits(kept);
 }

@@ -53,9 +53,9 @@ typedef struct kernel_batch {
 
 /* Stores the indices, in the mesh part, of the vertices of lane n's cell, sorted by the vertices' coordinates
  * (kernel_cell.h). */
-SIMD_INLINE void kernel_batch_vertices(const kernel_batch *b, int n, int64_t out[4])
+SIMD_INLINE void kernel_batch_get_vertex_indices(const kernel_batch *b, int n, int64_t out[4])
 {
-    for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_index(b->queued, b->tets.vertex[i][n]);
+    for (int i = 0; i < 4; i++) out[i] = kernel_surface_cells_get_mesh_index(b->queued, b->tets.vertex[i][n]);
 }
 
 /* Begins a batch with the queued cells: transforms them into tile space, and reads their values, minus the isovalues,
@@ -121,8 +121,9 @@ SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_b
     else
         kernel_tet_rays_interval(&b->tets, r, has_colour, &i);
     if (!vm_any(i.mask)) return i.mask;
-    const vf v_out = kernel_end_in_cell(i.v_in, i.v_out, b->is_of_faces);
-    const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, r->far), vf_le(kernel_lane_rays_near(t, r), i.t_out)));
+    const vf v_out = kernel_move_end_value_into_cell(i.v_in, i.v_out, b->is_of_faces);
+    const vm near =
+        vm_and(i.mask, vm_and(vf_le(i.t_in, r->far), vf_le(kernel_lane_rays_get_begin_depths(t, r), i.t_out)));
     const vm change = vm_and(near, vm_xor(vf_lt(i.v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
     if (!vm_any(change)) return change;
     *depth = kernel_secant(i.t_in, i.v_in, i.t_out, v_out);
@@ -135,12 +136,13 @@ SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_b
 }
 
 /* Computes the contour lines' field in lane n's cell: element n of line_value, line_gradient and line_along. */
-static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
+static __attribute__((noinline)) void kernel_batch_compute_cell_line_field(const kernel_tile_trace *t, kernel_batch *b,
+                                                                           int n)
 {
     double world[4][3];
     int64_t vertices[4];
     kernel_tet_line line;
-    kernel_batch_vertices(b, n, vertices);
+    kernel_batch_get_vertex_indices(b, n, vertices);
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < 3; a++) world[i][a] = kernel_halves_lane(b->tets.world[i][a], n);
     kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, b->queued->part, (const double(*)[3])world, vertices,
@@ -152,9 +154,9 @@ static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_t
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits. */
-static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_trace *t, kernel_batch *b,
-                                                              const kernel_lane_rays *r, unsigned hit, vf depth,
-                                                              kernel_line_field *out)
+static __attribute__((noinline)) void kernel_batch_compute_line_field(const kernel_tile_trace *t, kernel_batch *b,
+                                                                      const kernel_lane_rays *r, unsigned hit, vf depth,
+                                                                      kernel_line_field *out)
 {
     vf last[3];
     if (!b->line_lanes) {
@@ -164,7 +166,7 @@ static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_
     }
     for (; hit; hit &= hit - 1) {
         const int n = r->lane[__builtin_ctz(hit)];
-        if (!(b->line_lanes >> n & 1)) kernel_batch_set_line_field(t, b, n);
+        if (!(b->line_lanes >> n & 1)) kernel_batch_compute_cell_line_field(t, b, n);
     }
     out->value = kernel_gather_lane(b->line_value, r->lane);
     for (int a = 0; a < 3; a++) {
@@ -172,11 +174,11 @@ static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_
         out->normal[a] = vf_permute(b->normal[a], r->lane);
         last[a] = vf_permute(b->tets.at[a][3], r->lane);
     }
-    kernel_line_field_move(out, &r->rays, depth, last, kernel_gather_lane(b->line_along, r->lane));
+    kernel_line_field_add_change_to_hit(out, &r->rays, depth, last, kernel_gather_lane(b->line_along, r->lane));
 }
 
 /* Computes a vector along the normal at the hit of each ray, in camera axes. */
-SIMD_INLINE void kernel_batch_normals(const kernel_tile_trace *t, kernel_batch *b, vi lane, vf normal[3])
+SIMD_INLINE void kernel_batch_gather_normals(const kernel_tile_trace *t, kernel_batch *b, vi lane, vf normal[3])
 {
     if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
     for (int a = 0; a < 3; a++) normal[a] = vf_permute(b->normal[a], lane);
@@ -188,16 +190,16 @@ static __attribute__((noinline)) unsigned kernel_batch_accept_plain(kernel_tile_
                                                                     const kernel_lane_rays *r, vm hit, vf depth)
 {
     vf normal[3];
-    kernel_batch_normals(t, b, r->lane, normal);
+    kernel_batch_gather_normals(t, b, r->lane, normal);
     return kernel_lane_hits_accept_opaque(t, b->queued, r, hit, depth, normal, NULL);
 }
 
 /* Accepts the hits of one vector of rays on any layer. is_whole: set if the rays are a whole packet; w: values of the
  * colour field at the hits. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
  * one. */
-static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b,
-                                                              const kernel_lane_rays *r, bool is_whole, vm hit,
-                                                              vf depth, vf w)
+static __attribute__((noinline)) unsigned kernel_batch_accept_hits(kernel_tile_trace *t, kernel_batch *b,
+                                                                   const kernel_lane_rays *r, bool is_whole, vm hit,
+                                                                   vf depth, vf w)
 {
     kernel_line_field along;
     /* members are set one by one, because an initializer would clear all members of the struct */
@@ -206,11 +208,11 @@ static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace 
     h.w = w;
     h.vertex_count = 4;
     h.along = NULL;
-    kernel_batch_normals(t, b, r->lane, h.normal);
+    kernel_batch_gather_normals(t, b, r->lane, h.normal);
     for (int a = 0; a < 3; a++) h.vertices[a] = (const float(*)[SIMD_WIDTH])b->tets.at[a];
     h.vertices[3] = (const float(*)[SIMD_WIDTH])b->tets.f;
     if (t->surface->layer->lines) {
-        kernel_batch_line_field(t, b, r, vm_bits(hit), depth, &along);
+        kernel_batch_compute_line_field(t, b, r, vm_bits(hit), depth, &along);
         h.along = &along;
     }
     if (!is_whole) return kernel_lane_hits_accept(t, b->queued, r, hit, &h);
@@ -250,7 +252,7 @@ SIMD_INLINE void kernel_batch_trace_rays(kernel_tile_trace *t, kernel_batch *b, 
         if (!has_colour && b->is_plain && !is_whole)
             nearer |= kernel_batch_accept_plain(t, b, &own, hit, depth);
         else
-            nearer |= kernel_batch_accept(t, b, &own, is_whole, hit, depth, w);
+            nearer |= kernel_batch_accept_hits(t, b, &own, is_whole, hit, depth, w);
     }
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     b->rays.count = b->whole_count = 0;
@@ -273,7 +275,7 @@ static __attribute__((noinline)) void kernel_batch_trace(kernel_tile_trace *t, k
 SIMD_INLINE void kernel_batch_list_rays(kernel_tile_trace *t, kernel_batch *b, int n, unsigned blocks, bool is_whole)
 {
     for (unsigned left = b->queued->blocks[n] & ~t->begun; left; left &= left - 1)
-        kernel_block_begin(t, __builtin_ctz(left));
+        kernel_block_set_up_packets(t, __builtin_ctz(left));
     if (is_whole)
         kernel_pixel_list_add_blocks(&b->rays, blocks, n);
     else
@@ -283,15 +285,15 @@ SIMD_INLINE void kernel_batch_list_rays(kernel_tile_trace *t, kernel_batch *b, i
 }
 
 /* Traces the queue's cells, which become the current batch, and empties the queue. */
-static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t, kernel_batch *b,
-                                                           kernel_surface_cells *queued)
+static __attribute__((noinline)) void kernel_batch_trace_queued_cells(kernel_tile_trace *t, kernel_batch *b,
+                                                                      kernel_surface_cells *queued)
 {
     unsigned small = 0;
     kernel_batch_begin(t, b, queued);
     for (int n = 0; n < queued->count; n++) {
         const unsigned blocks = kernel_surface_cells_visible_blocks(t, queued, n);
         if (!blocks) continue;
-        if (KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 2 * kernel_box_pixels(queued->box[n]))
+        if (KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 2 * kernel_count_pixels_in_box(queued->box[n]))
             kernel_batch_list_rays(t, b, n, blocks, true);
         else
             small |= 1u << n;

@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_contraction_set_cell(const kernel_bounds *b, vi lane, in
 /* Moves the reference coordinates r to the nearest point of the domain D. For hexes and wedges, D is the reference
  * domain widened by domain_margin; for pyramids it is the reference domain itself, and r is moved to a point of D that
  * is only close to the nearest one. */
-SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
+SIMD_INLINE void kernel_contraction_clamp_to_domain(int type, vf domain_margin, vf r[3])
 {
     const vf half = 0.5f + domain_margin;
     if (kernel_is_box(type)) {
@@ -115,8 +115,9 @@ SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
     }
 }
 
-/* Returns the maximum of the dot product s . x over all points x of the domain D (kernel_contraction_clamp()). */
-SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s[3])
+/* Returns the maximum of the dot product s . x over all points x of the domain D
+ * (kernel_contraction_clamp_to_domain()). */
+SIMD_INLINE vf kernel_evaluate_domain_support(int type, vf domain_margin, const vf s[3])
 {
     const vf half = 0.5f + domain_margin;
     if (kernel_is_box(type)) return half * ((vf_abs(s[0]) + vf_abs(s[1])) + vf_abs(s[2]));
@@ -129,7 +130,7 @@ SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s
 
 /* Converts the reference coordinates r to those of kernel_local.h, which differ only for a pyramid: there the first two
  * are counted from the pyramid's axis. */
-SIMD_INLINE void kernel_contraction_to_local(int type, const vf r[3], vf out[3])
+SIMD_INLINE void kernel_convert_to_local_reference(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
     if (!kernel_has_apex(type)) return;
@@ -138,10 +139,10 @@ SIMD_INLINE void kernel_contraction_to_local(int type, const vf r[3], vf out[3])
 
 /* Returns a lower bound of the distance from the reference coordinates r to the border of the reference domain. It is
  * negative if r is outside. */
-SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
+SIMD_INLINE vf kernel_bound_distance_to_domain_border(int type, const vf r[3])
 {
     vf local[3];
-    kernel_contraction_to_local(type, r, local);
+    kernel_convert_to_local_reference(type, r, local);
     const vf inside = kernel_local_border_distance(type, local);
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
@@ -152,7 +153,7 @@ SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
  * The test allows for 8 error_bound and a thousandth of |s|^2, which is more. */
 SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
-    const vf most = kernel_contraction_support(type, c->domain_margin, s) - kernel_dot(s, q);
+    const vf most = kernel_evaluate_domain_support(type, c->domain_margin, s) - kernel_dot(s, q);
     vf error_bound = 8.0f * c->error_bound;
     /* the domain D of a pyramid is not widened by domain_margin, the bound of the errors of face crossings; instead,
      * twice the maximum over D is increased by 4 domain_margin */
@@ -178,8 +179,8 @@ SIMD_INLINE void kernel_find_only_root_by_contraction(const kernel_contraction *
     }
     const vm sure = vm_and(rays, vf_lt(c->error_growth, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
-        kernel_contraction_clamp(type, c->domain_margin, q);
-        kernel_contraction_to_local(type, q, local);
+        kernel_contraction_clamp_to_domain(type, c->domain_margin, q);
+        kernel_convert_to_local_reference(type, q, local);
         kernel_nonlinear_terms_at(type, local, term, unused);
         /* For a pyramid, kernel_bounds.h computes J0 with the value 1/2 of a b / k^2 instead of 1/4, its value at the
          * centre. Therefore N also has this linear term. */
@@ -197,7 +198,7 @@ SIMD_INLINE void kernel_find_only_root_by_contraction(const kernel_contraction *
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
     const vf off = c->error_growth * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->error_growth) * c->error_bound;
-    const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
+    const vm inside = vf_lt(off + c->domain_margin, kernel_bound_distance_to_domain_border(type, out->r));
     out->mask = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), *none);
     vf e = c->level + c->middle;
     for (int k = 0; k < terms; k++) e += c->field_terms[k] * term[k];

@@ -55,8 +55,8 @@ typedef struct kernel_cuboids {
 /* Computes the rows of the inverse Jacobians in tile space (out->normal), for the first half of the lanes (half = 0) or
  * the second. The vertices are sorted by coordinates, so that vertices 1, 3 and 4 are the neighbours of vertex 0 along
  * z, y and x. */
-SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, const kernel_frame *f,
-                                        const kernel_tile *tile, int half, kernel_cuboids *out)
+SIMD_INLINE void kernel_cuboids_compute_inverse_jacobians(const kernel_transformed_curved *cells, const kernel_frame *f,
+                                                          const kernel_tile *tile, int half, kernel_cuboids *out)
 {
     static const int neighbour[3] = {1, 3, 4};
     const double scale = f->job->space.scale, shear_x = f->job->camera.is_orthographic ? 0 : tile->centre_x;
@@ -74,7 +74,7 @@ SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, 
 
 /* Returns an upper bound of the magnitude of the field's derivative along reference axis i, by the differences along
  * the cell's four edges in that direction. */
-SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
+SIMD_INLINE vf kernel_cuboids_bound_field_derivative(const float values[8][SIMD_WIDTH], int i)
 {
     static const signed char edges[3][4][2] = {
         {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
@@ -87,10 +87,10 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
 /* Computes value_error and domain_margin of the lanes in `cuboid`. In the code, reach is the largest magnitude of the
  * vertices' coordinates, gap an upper bound of the distance between a face's computed crossing and the ray, and own an
  * error bound of a ray's reference coordinates; gap and own are in reference coordinates. The comments on
- * kernel_f64_bounds() and kernel_bounds_store_iteration_errors() derive gap and own; both are doubled here as they are
- * there. */
-SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
-                                       kernel_cuboids *out)
+ * kernel_f64_compute_bounds() and kernel_bounds_store_iteration_errors() derive gap and own; both are doubled here as
+ * they are there. */
+SIMD_INLINE void kernel_cuboids_compute_error_bounds(const kernel_transformed_curved *cells, const kernel_beam *beam,
+                                                     vm cuboid, kernel_cuboids *out)
 {
     vf reach[3], extent[3], margin = vf_set(4e-6f), error = vf_set(KERNEL_CUBOID_ROUNDING);
     for (int a = 0; a < 3; a++) {
@@ -111,7 +111,7 @@ SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, c
         vf own = 0.125f * (across * (size[0] + size[1]));
         for (int a = 0; a < 3; a++) own += 3e-7f * (size[a] * extent[a]);
         margin += 2 * (gap + own);
-        error += 2 * ((gap + own) * kernel_cuboids_slope(cells->at[3], i));
+        error += 2 * ((gap + own) * kernel_cuboids_bound_field_derivative(cells->at[3], i));
     }
     cuboid = vm_and(cuboid, vf_lt(margin, vf_set(0.015625f)));
     vf_store(out->domain_margin, vf_select(cuboid, margin, vf_set(INFINITY)));
@@ -119,17 +119,17 @@ SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, c
 }
 
 /* Computes the coefficients and error bounds of the lanes' cells. */
-static __attribute__((noinline)) void kernel_cuboids_compute(const kernel_transformed_curved *cells,
-                                                             const kernel_frame *f, const kernel_tile *tile,
-                                                             kernel_cuboids *out)
+static __attribute__((noinline)) void kernel_cuboids_compute_coefficients(const kernel_transformed_curved *cells,
+                                                                          const kernel_frame *f,
+                                                                          const kernel_tile *tile, kernel_cuboids *out)
 {
-    const kernel_beam beam = kernel_tile_beam(f, tile);
+    const kernel_beam beam = kernel_bound_rays_of_tile(f, tile);
     vf v[8], c[8];
     for (int i = 0; i < 8; i++) v[i] = vf_load(cells->at[3][i]);
     KERNEL_HEX_FIT(c, v);
     for (int i = 0; i < 8; i++) vf_store(out->field[i], c[i]);
-    for (int half = 0; half < 2; half++) kernel_cuboids_normals(cells, f, tile, half, out);
-    kernel_cuboids_errors(cells, &beam, vm_from_bits(cells->cuboids), out);
+    for (int half = 0; half < 2; half++) kernel_cuboids_compute_inverse_jacobians(cells, f, tile, half, out);
+    kernel_cuboids_compute_error_bounds(cells, &beam, vm_from_bits(cells->cuboids), out);
 }
 
 /* A ray's interval in its cell widened by domain_margin, and the field along it, one ray per lane. */
@@ -175,13 +175,13 @@ SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (
 
 /* Computes the coefficients k0 to k3 of the cubic polynomial in s that is the field along each ray's interval. lane:
  * the lane that holds each ray's cell. */
-SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
+SIMD_INLINE void kernel_cuboid_compute_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
 {
     const vf *c = ray->field, *r = ray->r, *d = ray->d;
     vf g[3];
     for (int i = 0; i < 8; i++) ray->field[i] = kernel_gather_lane(cells->field[i], lane);
     ray->value_error = kernel_gather_lane(cells->value_error, lane);
-    const kernel_product m = kernel_product_at(false, r);
+    const kernel_product m = kernel_compute_coordinate_product(false, r);
     kernel_polynomial_gradient(c, false, &m, r, g);
     ray->k[0] = kernel_polynomial_value(c, false, &m, r);
     ray->k[1] = kernel_dot(g, d);
@@ -217,7 +217,7 @@ SIMD_INLINE vf kernel_cuboid_derivative(const vf k[4], vf s)
 /* Refines the root *s of the given rays by Newton's method; a step that leaves the bracket of the root is replaced by a
  * bisection. Returns the rays whose roots have not converged. A root that has converged is not changed any more, so
  * that it does not depend on the other rays. */
-SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s)
+SIMD_INLINE vm kernel_cuboid_refine_root(const kernel_cuboid_ray *ray, vm rays, vf *s)
 {
     vf low = vf_set(0), high = vf_set(1);
     const vm falls = vf_lt(vf_set(0), ray->k[0]);
@@ -238,7 +238,7 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
 
 /* Returns the field at the reference coordinates r in each ray's cell, interpolated between the values at the vertices.
  * Its error is four roundings of the largest value, which is less than the error of the field's polynomial. */
-SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, const vf r[3])
+SIMD_INLINE vf kernel_cuboid_interpolate_field(const float values[8][SIMD_WIDTH], vi lane, const vf r[3])
 {
     vf v[8];
     for (int i = 0; i < 8; i++) v[i] = kernel_gather_lane(values[i], lane);
@@ -263,22 +263,22 @@ SIMD_INLINE void kernel_cuboid_find_roots(const kernel_cuboids *cells, const flo
     *none = vm_andnot(rays, within);
     rays = vm_and(rays, within);
     if (!vm_any(rays)) return;
-    kernel_cuboid_polynomial(cells, p->lane, &ray);
+    kernel_cuboid_compute_polynomial(cells, p->lane, &ray);
     vm no_root;
     kernel_cuboid_count_roots(&ray, &no_root, &out->mask, &s);
     *none = vm_or(*none, vm_and(rays, no_root));
     out->mask = vm_and(rays, out->mask);
     if (!vm_any(out->mask)) return;
-    out->mask = vm_andnot(out->mask, kernel_cuboid_newton(&ray, out->mask, &s));
+    out->mask = vm_andnot(out->mask, kernel_cuboid_refine_root(&ray, out->mask, &s));
     for (int i = 0; i < 3; i++) out->r[i] = ray.r[i] + s * ray.d[i];
-    s -= kernel_cuboid_value(at[3], p->lane, out->r) / kernel_cuboid_derivative(ray.k, s);
+    s -= kernel_cuboid_interpolate_field(at[3], p->lane, out->r) / kernel_cuboid_derivative(ray.k, s);
     for (int i = 0; i < 3; i++) {
         out->r[i] = ray.r[i] + s * ray.d[i];
         const vm inside = vm_and(vf_lt(ray.domain_margin, out->r[i]), vf_lt(out->r[i], 1 - ray.domain_margin));
         out->mask = vm_and(out->mask, inside);
     }
     out->t = ray.origin[2] + (ray.begin + s * ray.length);
-    const kernel_product m = kernel_product_at(false, out->r);
+    const kernel_product m = kernel_compute_coordinate_product(false, out->r);
     kernel_polynomial_gradient(ray.field, false, &m, out->r, g);
     for (int a = 0; a < 3; a++)
         gradient[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];

@@ -55,7 +55,7 @@ typedef struct kernel_curved_batch {
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_cuboids cuboids;
-    /* set if `bounds` and the data of the cells' faces (kernel_transformed_faces()) have been computed */
+    /* set if `bounds` and the data of the cells' faces (kernel_compute_face_data()) have been computed */
     bool has_bounds;
     kernel_bounds bounds;
     unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
@@ -79,7 +79,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
 }
 
 /* Returns the batch's cells as a kernel_curved, the form in which the search for roots reads cells. */
-SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
+SIMD_INLINE kernel_curved kernel_curved_batch_get_cells(kernel_curved_batch *h)
 {
     return (kernel_curved){
         .type = h->queued->type, .at = h->transformed.at, .colours = h->colours, .bounds = &h->bounds};
@@ -92,13 +92,13 @@ SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kerne
 {
     if (h->copied_lanes >> n & 1) return;
     h->copied_lanes |= 1u << n;
-    kernel_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
+    kernel_copy_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
     kernel_cell_compute_lines(&h->cells[n], t->frame, &t->tile);
     h->cells[n].part = h->queued->part;
     h->cells[n].index = h->queued->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     for (int i = 0; i < h->cells[n].count; i++)
-        h->cells[n].vertices[i] = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
+        h->cells[n].vertices[i] = kernel_surface_cells_get_mesh_index(h->queued, h->transformed.vertex[i][n]);
 }
 
 /* Traces, cell by cell, those rays of the vector that begins at index `first` of the list `rays` whose bits are set in
@@ -109,7 +109,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
                                                                            const kernel_pixel_list *rays, int first,
                                                                            vi at_lanes, unsigned wanted)
 {
-    kernel_curved curved = kernel_curved_batch_cells(h);
+    kernel_curved curved = kernel_curved_batch_get_cells(h);
     curved.is_contracted = true;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
@@ -128,8 +128,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
         p->is_nearer = false;
         kernel_curved_batch_copy_cell(t, h, n);
         curved.lane = n;
-        kernel_curved_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
-                              vm_and(p->active, vm_from_bits(same)));
+        kernel_curved_trace_isovalue(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
+                                     vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -180,9 +180,9 @@ SIMD_INLINE void kernel_curved_batch_load(const kernel_tile_trace *t, const kern
 /* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
  * contraction (kernel_contraction.h). Rays with exactly one crossing are moved to `found`, rays without one are
  * dropped, and undecided rays remain in `rays`. */
-SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
+SIMD_INLINE void kernel_curved_batch_contract_of_type(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
-    const kernel_curved cells = kernel_curved_batch_cells(h);
+    const kernel_curved cells = kernel_curved_batch_get_cells(h);
     int kept = 0;
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
@@ -198,7 +198,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_find_only_root_by_contraction(&c, p.active, &at, &none, type);
         at.t += kernel_gather_lane(h->transformed.at[2][0], p.lane);
         at.value = vf_set(0);
-        kernel_curved_ends_add(&h->rays, n, &at, 1, vm_bits(at.mask), &h->found, h->found_ends);
+        kernel_append_rays_with_crossings(&h->rays, n, &at, 1, vm_bits(at.mask), &h->found, h->found_ends);
         kept = kernel_curved_batch_keep_rays(h, n, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
     }
     h->rays.count = kept;
@@ -206,9 +206,10 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
     kernel_pixel_list_pad(&h->found);
 }
 
-static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) void kernel_curved_batch_contract_rays(const kernel_tile_trace *t,
+                                                                        kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of_type, t, h);
 }
 
 /* Adds the rays that cross exactly two faces of their cells once each to the list `met`, and the indices of these faces
@@ -225,13 +226,13 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
         uint8_t faces[SIMD_WIDTH];
         kernel_curved_batch_load(t, h, &h->rays, n, &p);
         if (!vm_any(p.active)) continue;
-        kernel_curved_faces(&h->transformed, &p, type, &two, &alone, face);
+        kernel_curved_find_faces_of_active_rays(&h->transformed, &p, type, &two, &alone, face);
         const vi both = face[0] | face[1] << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
         for (unsigned bits = vm_bits(two); bits; bits &= bits - 1) {
             const int i = __builtin_ctz(bits);
             h->faces[h->met.count] = faces[i];
-            kernel_curved_ray_add(&h->met, &h->rays, n + i);
+            kernel_pixel_list_copy_ray(&h->met, &h->rays, n + i);
         }
         if (__builtin_expect(vm_any(alone), 0))
             nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(alone));
@@ -249,9 +250,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_
 /* Computes the points at which the rays in `met` enter and leave their cells, and the field there. Rays with exactly
  * one root according to these values are added to `found`. Rays whose roots must be searched for are added to `others`.
  */
-SIMD_INLINE void kernel_curved_batch_cross_faces(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
+SIMD_INLINE void kernel_curved_batch_intersect_of_type(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
-    const kernel_curved cells = kernel_curved_batch_cells(h);
+    const kernel_curved cells = kernel_curved_batch_get_cells(h);
     h->found.count = h->others.count = 0;
     for (int n = 0; n < h->met.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
@@ -262,64 +263,65 @@ SIMD_INLINE void kernel_curved_batch_cross_faces(const kernel_tile_trace *t, ker
         kernel_lane_rays_begin(&p, t, &h->met, n);
         kernel_lane_rays_set_far(&p, t);
         kernel_curved_compute_crossings(&h->transformed, &p, type, faces, ends);
-        ends[1].value = kernel_end_in_cell(ends[0].value, ends[1].value, t->surface->layer->is_of_faces);
-        vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(kernel_lane_rays_near(t, &p), ends[1].t));
+        ends[1].value = kernel_move_end_value_into_cell(ends[0].value, ends[1].value, t->surface->layer->is_of_faces);
+        vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(kernel_lane_rays_get_begin_depths(t, &p), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
         const vm left = kernel_decide_by_ends(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
-        kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(found), &h->found, h->found_ends);
-        kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(left), &h->others, h->other_ends);
+        kernel_append_rays_with_crossings(&h->met, n, ends, 2, vm_bits(found), &h->found, h->found_ends);
+        kernel_append_rays_with_crossings(&h->met, n, ends, 2, vm_bits(left), &h->others, h->other_ends);
     }
 }
 
-static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) void kernel_curved_batch_intersect_faces(const kernel_tile_trace *t,
+                                                                          kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_cross_faces, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_intersect_of_type, t, h);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
  * own cell. */
-SIMD_INLINE void kernel_curved_batch_line_field(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
-                                                const vf r[3], kernel_line_field *out, int type)
+SIMD_INLINE void kernel_curved_batch_compute_line_field(const kernel_tile_trace *t, const kernel_curved_batch *h,
+                                                        vi lane, const vf r[3], kernel_line_field *out, int type)
 {
     kernel_map map;
     vf c[8];
-    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, lane, &map, type);
+    kernel_compute_maps_of_type((const float(*)[8][SIMD_WIDTH])h->transformed.at, lane, &map, type);
     kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
     kernel_map_line_field(&t->tile, &map, c, r, out);
 }
 
 /* Reads the field of the contour lines at the vertices of the lanes' cells. */
-static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
-                                                                      kernel_curved_batch *h)
+static __attribute__((noinline)) void kernel_curved_batch_read_line_values(const kernel_tile_trace *t,
+                                                                           kernel_curved_batch *h)
 {
     const grid_field *field = &t->surface->layer->lines->field.fields[h->queued->part];
     for (int n = 0; n < h->queued->count; n++)
-        for (int i = 0; i < grid_type_vertices(h->queued->type); i++) {
-            const int64_t vertex = kernel_surface_cells_index(h->queued, h->transformed.vertex[i][n]);
-            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, vertex);
+        for (int i = 0; i < grid_type_vertex_count(h->queued->type); i++) {
+            const int64_t vertex = kernel_surface_cells_get_mesh_index(h->queued, h->transformed.vertex[i][n]);
+            h->lines[i][n] = (float)kernel_lines_read_vertex_value(t->surface, field, vertex);
         }
 }
 
 /* Accepts the hits of one vector of rays. points: the hits; normal: as in kernel_hits, a vector along the normal or
  * reference coordinates. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
-static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
-                                                                     const kernel_lane_rays *p, vm hit,
-                                                                     const kernel_point *points, const vf normal[3])
+static __attribute__((noinline)) unsigned
+kernel_curved_batch_accept_hits(kernel_tile_trace *t, const kernel_curved_batch *h, const kernel_lane_rays *p, vm hit,
+                                const kernel_point *points, const vf normal[3])
 {
     const render_surface_layer *layer = t->surface->layer;
     const int type = h->queued->type;
     if (kernel_tile_hits_are_plain(t))
         return kernel_lane_hits_accept_opaque(t, h->queued, p, hit, points->t, normal, NULL);
     kernel_line_field along;
-    kernel_surface_hits hits = {.t = points->t, .vertex_count = grid_type_vertices(type)};
+    kernel_surface_hits hits = {.t = points->t, .vertex_count = grid_type_vertex_count(type)};
     memcpy(hits.normal, normal, sizeof hits.normal);
     for (int a = 0; a < 4; a++) hits.vertices[a] = (const float(*)[SIMD_WIDTH])h->transformed.at[a];
     if (layer->colour_map)
-        hits.w = kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, points->r, type);
+        hits.w = kernel_interpolate_value_in_cells((const float(*)[SIMD_WIDTH])h->colours, p->lane, points->r, type);
     if (layer->lines) {
-        KERNEL_OF_TYPE(type, kernel_curved_batch_line_field, t, h, p->lane, points->r, &along);
+        KERNEL_OF_TYPE(type, kernel_curved_batch_compute_line_field, t, h, p->lane, points->r, &along);
         hits.along = &along;
     }
     return kernel_lane_hits_accept(t, h->queued, p, hit, &hits);
@@ -340,15 +342,15 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
                                             vf normal[3])
 {
     vf gradient[3] = {vf_set(0), vf_set(0), vf_set(0)};
-    if (t->surface->layer->normal != RENDER_VERTEX) kernel_lanes_normal(map, r, gradient);
+    if (t->surface->layer->normal != RENDER_VERTEX) kernel_compute_gradient_direction(map, r, gradient);
     kernel_curved_batch_store_normal(t, gradient, r, normal);
 }
 
 /* Accepts the visible hits of the rays in `rays` that certainly have exactly one root in a cuboid, and drops rays that
  * certainly have none. Undecided rays, and rays in cells that are not cuboids, remain in `rays`. Returns a mask of the
  * blocks that contain a ray whose hit is nearer than its previous one. */
-static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kernel_tile_trace *t,
-                                                                            kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_accept_cuboid_roots(kernel_tile_trace *t,
+                                                                                  kernel_curved_batch *h)
 {
     const float(*const at)[8][SIMD_WIDTH] = (const float(*)[8][SIMD_WIDTH])h->transformed.at;
     unsigned nearer = 0;
@@ -365,7 +367,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
         const vm hit = kernel_visible_lane_hits(t, &p, root.mask, root.t);
         if (vm_any(hit)) {
             kernel_curved_batch_store_normal(t, gradient, root.r, normal);
-            nearer |= kernel_curved_batch_accept(t, h, &p, hit, &root, normal);
+            nearer |= kernel_curved_batch_accept_hits(t, h, &p, hit, &root, normal);
         }
         kept = kernel_curved_batch_keep_rays(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
     }
@@ -375,7 +377,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
 }
 
 /* Refines the roots of the rays in `found`, and accepts those that are visible. is_contracted: the roots come from
- * kernel_curved_batch_contract(), and are so accurate that they need no bracket. Returns a mask of the blocks that
+ * kernel_curved_batch_contract_rays(), and are so accurate that they need no bracket. Returns a mask of the blocks that
  * contain a ray whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, kernel_curved_batch *h,
                                                          bool is_contracted, int type)
@@ -389,7 +391,7 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, k
         kernel_lane_rays_begin(&p, t, &h->found, n);
         kernel_lane_rays_set_far(&p, t);
         kernel_curved_ends_load(h->found_ends, n, is_contracted ? 1 : 2, ends);
-        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
+        kernel_compute_maps_of_type((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
             kernel_refine_accurate_roots(&p.rays, &map, p.active, &at);
@@ -402,7 +404,7 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, k
         if (!vm_any(hit)) continue;
         vf normal[3];
         kernel_curved_batch_normal(t, &map, at.r, normal);
-        nearer |= kernel_curved_batch_accept(t, h, &p, hit, &at, normal);
+        nearer |= kernel_curved_batch_accept_hits(t, h, &p, hit, &at, normal);
     }
     return nearer;
 }
@@ -429,7 +431,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     kernel_lane_rays_set_far(&p, t);
     kernel_curved_ends_load(h->other_ends, n, 2, ends);
     kernel_interval_from_points(p.active, &ends[0], &ends[1], &i);
-    const kernel_curved cells = kernel_curved_batch_cells(h);
+    const kernel_curved cells = kernel_curved_batch_get_cells(h);
     if (!kernel_search_cells(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
     do {
         kernel_point at;
@@ -439,7 +441,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
         const vm hit = kernel_visible_lane_hits(t, &p, s.found, at.t);
         if (!vm_any(hit)) continue;
         kernel_curved_batch_normal(t, &s.map, at.r, normal);
-        nearer |= kernel_curved_batch_accept(t, h, &p, hit, &at, normal);
+        nearer |= kernel_curved_batch_accept_hits(t, h, &p, hit, &at, normal);
         if (kernel_tile_layer_is_opaque(t)) kernel_search_close(&s, hit);
     } while (kernel_search_continue(&s));
     return nearer;
@@ -447,14 +449,15 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
 
 /* ---- processing a whole batch ---- */
 
-/* Computes the data of the faces (kernel_transformed_faces()) and the bounds (kernel_bounds) of the batch's cells,
+/* Computes the data of the faces (kernel_compute_face_data()) and the bounds (kernel_bounds) of the batch's cells,
  * unless that has been done. */
 static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
+    const kernel_beam beam = kernel_bound_rays_of_tile(t->frame, &t->tile);
     if (h->has_bounds) return;
-    kernel_transformed_faces(&h->transformed, t->frame, &t->tile, h->queued->type);
-    kernel_bounds_of(h->queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
+    kernel_compute_face_data(&h->transformed, t->frame, &t->tile, h->queued->type);
+    kernel_compute_bounds_of_cells(h->queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam,
+                                   &h->bounds);
     h->has_bounds = true;
 }
 
@@ -464,10 +467,10 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
 {
     if (!h->rays.count) return 0;
     kernel_curved_batch_set_bounds(t, h);
-    kernel_curved_batch_contract(t, h);
+    kernel_curved_batch_contract_rays(t, h);
     unsigned nearer = kernel_curved_batch_accept_found(t, h, true);
     nearer |= kernel_curved_batch_find_faces(t, h);
-    kernel_curved_batch_cross(t, h);
+    kernel_curved_batch_intersect_faces(t, h);
     kernel_pixel_list_pad(&h->found);
     kernel_pixel_list_pad(&h->others);
     nearer |= kernel_curved_batch_accept_found(t, h, false);
@@ -479,7 +482,7 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
 static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     kernel_pixel_list_pad(&h->rays);
-    unsigned nearer = h->transformed.cuboids ? kernel_curved_batch_cross_cuboids(t, h) : 0;
+    unsigned nearer = h->transformed.cuboids ? kernel_curved_batch_accept_cuboid_roots(t, h) : 0;
     nearer |= kernel_curved_batch_trace_others(t, h);
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     h->rays.count = 0;
@@ -491,7 +494,7 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
                                                unsigned blocks)
 {
     kernel_pixel_list_add_box(&h->rays, box, lane);
-    for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
+    for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_set_up_packets(t, __builtin_ctz(blocks));
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
@@ -506,14 +509,14 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
                                                  queued->isovalue, queued->type);
     h->has_bounds = false;
     kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])h->transformed.world,
-                                   grid_type_vertices(queued->type));
-    if (h->transformed.cuboids) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
+                                   grid_type_vertex_count(queued->type));
+    if (h->transformed.cuboids) kernel_cuboids_compute_coefficients(&h->transformed, t->frame, &t->tile, &h->cuboids);
     if (t->surface->layer->colour_map)
         kernel_surface_cells_read_colours(t->surface, queued, (const int32_t(*)[SIMD_WIDTH])h->transformed.vertex,
                                           h->colours);
-    if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
+    if (t->surface->layer->lines) kernel_curved_batch_read_line_values(t, h);
     h->copied_lanes = 0;
-    kernel_curved cells = kernel_curved_batch_cells(h);
+    kernel_curved cells = kernel_curved_batch_get_cells(h);
     for (int n = 0; n < queued->count; n++) {
         const unsigned blocks = kernel_surface_cells_visible_blocks(t, queued, n);
         if (!blocks) continue;
@@ -524,13 +527,13 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
         kernel_curved_batch_set_bounds(t, h);
         kernel_curved_batch_copy_cell(t, h, n);
         cells.lane = n;
-        kernel_blocks_trace(t, blocks, queued->part, queued->cell[n], &h->cells[n], &cells, queued->value[n]);
+        kernel_trace_cell_in_blocks(t, blocks, queued->part, queued->cell[n], &h->cells[n], &cells, queued->value[n]);
     }
 }
 
 /* Traces the queue's cells, which become the current batch, and empties the queue. */
-static __attribute__((noinline)) void kernel_curved_batch_process(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                  kernel_surface_cells *queued)
+static __attribute__((noinline)) void
+kernel_curved_batch_trace_queued_cells(kernel_tile_trace *t, kernel_curved_batch *h, kernel_surface_cells *queued)
 {
     kernel_curved_batch_transform(t, h, queued);
     if (h->rays.count) kernel_curved_batch_trace(t, h);

@@ -52,18 +52,18 @@ typedef struct kernel_probe {
 
 /* Sets c->f to the values at the vertices minus the isovalue, times a factor that is the same for all cells that the
  * surface crosses. */
-SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
+SIMD_INLINE void kernel_probe_subtract_isovalue(const kernel_probe *probe, kernel_cell *c)
 {
     for (int i = 0; i < c->count; i++)
         c->f[i] = kernel_clamp((c->values[i] - probe->isovalue) * probe->surface->value_scale, 1e18);
 }
 
 /* Computes the rays' intervals in the tet c, whose vertices must have been transformed into tile space. */
-SIMD_INLINE void kernel_probe_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
+SIMD_INLINE void kernel_probe_intersect_tet(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
 {
     const kernel_lane_rays r = {.rays = kernel_packet_rays(p), .active = rays};
     kernel_transformed_tets tet;
-    kernel_transformed_tets_set(&tet, c);
+    kernel_set_all_lanes_to_tet(&tet, c);
     kernel_tet_rays_interval_in_one(&tet, &r, 0, false, false, out);
 }
 
@@ -75,7 +75,7 @@ SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe,
     const bool is_tet = kernel_is_linear(c->type);
     int count = 1;
     if (is_tet)
-        kernel_probe_tet_interval(p, c, rays, &list[0]);
+        kernel_probe_intersect_tet(p, c, rays, &list[0]);
     else
         count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
@@ -87,7 +87,7 @@ SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe,
         if (!is_tet) {
             kernel_map map;
             kernel_map_setup(&map, c);
-            value = kernel_value_at(p, &map, i, own, probe->z);
+            value = kernel_evaluate_field_in_one_cell(p, &map, i, own, probe->z);
         }
         const vm is_number = vm_and(own, vf_eq(value, value));
         const vm taken = vm_and(is_number, vm_or(vm_not(probe->found), vf_lt(value, probe->sample)));
@@ -125,7 +125,7 @@ static void kernel_probe_sample_leaf(kernel_packet *p, kernel_probe *probe, int 
         if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
         const bool is_fresh = !c->is_transformed;
         if (is_fresh) kernel_cell_transform_in_tile(c, p->frame, p->tile, p->frame->job->parts[part].cells);
-        if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
+        if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_subtract_isovalue(probe, c);
         const vm near = kernel_probe_in_box(p, probe, c, rays);
         if (vm_any(near)) kernel_probe_sample_cell(p, probe, c, near);
     }
@@ -173,14 +173,14 @@ static void kernel_probe_sample_tree(kernel_packet *p, kernel_probe *probe, cons
 /* Computes probe->at, the points at depth t on the rays in tree space, and probe->pad, the margin of boxes. The
  * rounding errors of the points are at most 16 * 6e-8 times the magnitude of positions near the scene and the eye,
  * which is the margin. */
-static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *probe)
+static void kernel_probe_compute_points(const kernel_packet *p, vf t, kernel_probe *probe)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     double size = 0;
-    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_compute_pixel_slopes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         double base[3], direction[3];
-        kernel_tree_ray(p->frame, px[i], py[i], base, direction);
+        kernel_compute_scaled_world_ray(p->frame, px[i], py[i], base, direction);
         for (int a = 0; a < 3; a++) {
             probe->at[a][i] = (float)(base[a] + (double)t[i] * direction[a]);
             size = fmax(size, fabs(base[a]));
@@ -202,7 +202,7 @@ SIMD_INLINE vm kernel_probe_sample_at(const kernel_packet *p, kernel_probe *prob
     points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
     points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
     points.slope_x = points.slope_y = vf_set(0);
-    kernel_probe_points(p, t, probe);
+    kernel_probe_compute_points(p, t, probe);
     probe->at[axis] += offset;
     probe->z = t + offset * forward;
     probe->found = vm_none();
@@ -218,10 +218,10 @@ SIMD_INLINE vm kernel_probe_sample_at(const kernel_packet *p, kernel_probe *prob
  * behind the hit along the first world axis, then along the second and the third. value: index of the isovalue in the
  * layer. values[i]: the rays' samples number i, minus the isovalue; found[i]: the rays whose sample number i lies in a
  * cell. s must be one of the frame's surfaces. */
-static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
-                                                                int value, vm hit, vf t, vf reach,
-                                                                vm found[RENDER_DIFFERENCE_SAMPLES],
-                                                                vf values[RENDER_DIFFERENCE_SAMPLES])
+static __attribute__((noinline)) void kernel_sample_field_around_hits(const kernel_packet *p, const kernel_surface *s,
+                                                                      int value, vm hit, vf t, vf reach,
+                                                                      vm found[RENDER_DIFFERENCE_SAMPLES],
+                                                                      vf values[RENDER_DIFFERENCE_SAMPLES])
 {
     const kernel_frame *f = p->frame;
     kernel_probe probe = {.surface = s,
@@ -264,7 +264,7 @@ SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const ker
     vm found[RENDER_DIFFERENCE_SAMPLES];
     vf values[RENDER_DIFFERENCE_SAMPLES];
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
-    kernel_sample_differences(p, s, value, hit, t, reach, found, values);
+    kernel_sample_field_around_hits(p, s, value, hit, t, reach, found, values);
     kernel_normals_from_samples(p, found, values, hit, normal);
 }
 
@@ -320,7 +320,7 @@ static void kernel_pending_group_begin(kernel_pending_group *group, const kernel
     unsigned bits = 0;
     if (x - x % KERNEL_TILE != group->tile.x0 || y - y % KERNEL_TILE != group->tile.y0) {
         kernel_tile_setup(&group->tile, f, x - x % KERNEL_TILE, y - y % KERNEL_TILE);
-        kernel_tile_rays(&group->tile, f);
+        kernel_tile_compute_rays(&group->tile, f);
         thread->serial++;
     }
     kernel_pending_find_surface(group, f, kind);
@@ -352,8 +352,8 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
         vm found[RENDER_DIFFERENCE_SAMPLES];
         vf values[RENDER_DIFFERENCE_SAMPLES];
         kernel_pending_group_begin(&group, f, thread, hits + i, count - i);
-        kernel_sample_differences(&group.packet, group.surface, group.value, group.rays, group.t, group.reach, found,
-                                  values);
+        kernel_sample_field_around_hits(&group.packet, group.surface, group.value, group.rays, group.t, group.reach,
+                                        found, values);
         for (int n = 0; n < group.count; n++) {
             render_difference_samples *own = &out[i + n];
             *own = (render_difference_samples){0, 0, {0}};

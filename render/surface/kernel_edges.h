@@ -17,7 +17,7 @@
 #include "simd.h"
 
 /* Returns, per lane, the squared distance between points a and b, which have been projected along the lane's ray to
- * coordinates x and y with the ray at the origin (kernel_edge_position()). */
+ * coordinates x and y with the ray at the origin (kernel_project_vertex_along_ray()). */
 SIMD_INLINE vf kernel_squared_distance(const vf a[2], const vf b[2])
 {
     const vf x = b[0] - a[0], y = b[1] - a[1];
@@ -25,7 +25,7 @@ SIMD_INLINE vf kernel_squared_distance(const vf a[2], const vf b[2])
 }
 
 /* Returns the squared distance from each ray, which is at the origin, to the edge between vertices a and b, which have
- * been projected along the ray (kernel_edge_position()). */
+ * been projected along the ray (kernel_project_vertex_along_ray()). */
 SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -38,7 +38,7 @@ SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
 
 /* Projects one vertex per ray, given in tile space, along the ray: computes the vertex's x and y minus those of the ray
  * at the vertex's depth. */
-SIMD_INLINE void kernel_edge_position(const kernel_packet *p, vf x, vf y, vf z, vf out[2])
+SIMD_INLINE void kernel_project_vertex_along_ray(const kernel_packet *p, vf x, vf y, vf z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
     out[1] = y - (p->origin_y + p->slope_y * z);
@@ -47,16 +47,17 @@ SIMD_INLINE void kernel_edge_position(const kernel_packet *p, vf x, vf y, vf z, 
 /* Returns the squared distance from each ray to the nearest edge of a polygon, in the ray's plane. *length is raised to
  * the squared length of the polygon's longest edge. loop: the polygon's entries in render_part.loops: number of
  * vertices around it, number of segments per edge, and the vertices. */
-SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
+SIMD_INLINE vf kernel_squared_distance_to_polygon(const kernel_packet *p, const grid *g, const int64_t *loop,
+                                                  vf *length)
 {
     const int64_t count = loop[0], step = loop[1], *corners = loop + 2;
     vf last[2], next[2], begin[2], nearest = vf_set(INFINITY);
     for (int64_t i = 0; i <= count; i++) {
         double world[3];
         float x, y, z;
-        grid_vertex(g, corners[i % count], world);
+        grid_read_vertex_position(g, corners[i % count], world);
         kernel_transform_in_tile(p->frame, p->tile, world, &x, &y, &z);
-        kernel_edge_position(p, vf_set(x), vf_set(y), vf_set(z), next);
+        kernel_project_vertex_along_ray(p, vf_set(x), vf_set(y), vf_set(z), next);
         if (i > 0) nearest = vf_min(nearest, kernel_squared_edge_distance(last, next));
         if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_squared_distance(begin, next));
         memcpy(last, next, sizeof last);
@@ -67,16 +68,16 @@ SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *
 
 /* Lists the vertices of each ray's cell that lie in the surface, at most four, in the order of the cell's vertices.
  * places: their positions in the ray's plane. Returns the number of listed vertices for each ray. */
-SIMD_INLINE vf kernel_edge_face_vertices(const kernel_packet *p, const kernel_surface_hits *h, vf places[4][2])
+SIMD_INLINE vf kernel_list_vertices_in_surface(const kernel_packet *p, const kernel_surface_hits *h, vf places[4][2])
 {
     vf count = vf_set(0);
     for (int k = 0; k < 4; k++) places[k][0] = places[k][1] = vf_set(0);
     for (int i = 0; i < h->vertex_count; i++) {
         vf own[2];
         const vm is_in_surface = vf_eq(kernel_gather_lane(h->vertices[3][i], h->lane), vf_set(0));
-        kernel_edge_position(p, kernel_gather_lane(h->vertices[0][i], h->lane),
-                             kernel_gather_lane(h->vertices[1][i], h->lane),
-                             kernel_gather_lane(h->vertices[2][i], h->lane), own);
+        kernel_project_vertex_along_ray(p, kernel_gather_lane(h->vertices[0][i], h->lane),
+                                        kernel_gather_lane(h->vertices[1][i], h->lane),
+                                        kernel_gather_lane(h->vertices[2][i], h->lane), own);
         for (int k = 0; k < 4; k++) {
             const vm is_next = vm_and(is_in_surface, vf_eq(count, vf_set((float)k)));
             for (int a = 0; a < 2; a++) places[k][a] = vf_select(is_next, own[a], places[k][a]);
@@ -91,7 +92,7 @@ SIMD_INLINE vf kernel_edge_face_vertices(const kernel_packet *p, const kernel_su
 SIMD_INLINE vf kernel_squared_face_edge_distance(const kernel_packet *p, const kernel_surface_hits *h, vf *length)
 {
     vf places[4][2], nearest = vf_set(INFINITY);
-    const vf count = kernel_edge_face_vertices(p, h, places);
+    const vf count = kernel_list_vertices_in_surface(p, h, places);
     *length = vf_set(0);
     for (int i = 0; i < 4; i++) {
         const vm is_edge = vf_lt(vf_set((float)i), count), is_last = vf_eq(vf_set((float)(i + 1)), count);
@@ -120,7 +121,7 @@ static __attribute__((noinline)) void kernel_set_polygon_distances(const kernel_
         left &= ~same;
         if (!part->loops[cell]) continue;
         vf longest = vf_set(0);
-        const vf away = kernel_squared_loop_distance(p, part->cells, part->loops + part->loops[cell], &longest);
+        const vf away = kernel_squared_distance_to_polygon(p, part->cells, part->loops + part->loops[cell], &longest);
         *nearest = vf_select(vm_from_bits(same), away, *nearest);
         *length = vf_select(vm_from_bits(same), longest, *length);
     }

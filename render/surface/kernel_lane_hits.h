@@ -75,7 +75,7 @@ static __attribute__((noinline, cold)) vm kernel_lane_hits_kept_by_clips(const k
  * own clips keep. */
 SIMD_INLINE vm kernel_visible_lane_hits(const kernel_tile_trace *t, const kernel_lane_rays *r, vm hit, vf depth)
 {
-    const vm visible = vm_and(hit, vm_and(vf_le(kernel_lane_rays_near(t, r), depth), vf_le(depth, r->far)));
+    const vm visible = vm_and(hit, vm_and(vf_le(kernel_lane_rays_get_begin_depths(t, r), depth), vf_le(depth, r->far)));
     if (__builtin_expect(t->surface->own_clips == 0, 1)) return visible;
     /* a copy to be passed on, because taking the address of *r would keep the original in memory instead of
      * registers */
@@ -85,10 +85,11 @@ SIMD_INLINE vm kernel_visible_lane_hits(const kernel_tile_trace *t, const kernel
 
 /* Emits a ray's hit in the cell in lane n of `cells` as a fragment of its own. Callers do this if the hit has the same
  * depth as the ray's nearest hit. ray: lane of the packet p. */
-static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
-                                                                        int ray, const kernel_surface_cells *cells,
-                                                                        int n, float depth, const float normal[3],
-                                                                        const float colour[3])
+static __attribute__((noinline, cold)) void kernel_emit_ray_hit_of_equal_depth(kernel_packet *p,
+                                                                               const kernel_surface *s, int ray,
+                                                                               const kernel_surface_cells *cells, int n,
+                                                                               float depth, const float normal[3],
+                                                                               const float colour[3])
 {
     kernel_surface_hits h = {.value = vi_set(cells->value[n]),
                              .t = vf_set(depth),
@@ -99,7 +100,7 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
         h.normal[a] = vf_set(normal[a]);
         h.colour[a] = vf_set(colour[a]);
     }
-    kernel_accept_equal_depth(p, s, vm_from_bits(1u << ray), &h);
+    kernel_accept_hits_of_equal_depth(p, s, vm_from_bits(1u << ray), &h);
 }
 
 /* Accepts a hit of an opaque surface in the cell in lane n of `cells`: keeps it if it is the nearest hit of its ray, as
@@ -116,7 +117,7 @@ SIMD_INLINE unsigned kernel_accept_opaque_hit_of_ray(kernel_tile_trace *t, int a
     const float far = p->t_far[ray];
     if (!(depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
     if (depth == far && vm_bits(hits->found) >> ray & 1) {
-        kernel_ray_emit_equal_depth(p, s, ray, cells, n, depth, normal, colour);
+        kernel_emit_ray_hit_of_equal_depth(p, s, ray, cells, n, depth, normal, colour);
         return 0;
     }
     p->t_far[ray] = depth;

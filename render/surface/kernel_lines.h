@@ -38,13 +38,13 @@ typedef struct kernel_line_field {
 
 /* Returns the value at a vertex of the field whose contour lines are drawn, mapped as in kernel_lines (0 on the first
  * line and, if there are several, 1 on the last); it may be NaN. */
-SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
+SIMD_INLINE double kernel_lines_read_vertex_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
 {
     return (grid_field_value(field, vertex) - s->lines.low) * s->lines.inverse_width;
 }
 
 /* Computes the gradient g of a field that changes by df[i] along the vectors d[i], by Cramer's rule. */
-SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
+SIMD_INLINE void kernel_solve_for_gradient(const double d[3][3], const double df[3], double g[3])
 {
     double n[3][3];
     for (int i = 0; i < 3; i++) {
@@ -66,7 +66,7 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
         df[i] = value[i] - value[3];
         for (int a = 0; a < 3; a++) d[i][a] = (corner[i][a] - corner[3][a]) * scale;
     }
-    kernel_gradient((const double(*)[3])d, df, g);
+    kernel_solve_for_gradient((const double(*)[3])d, df, g);
     for (int a = 0; a < 3; a++) {
         const double *axis = f->scaled_axes[a];
         out[a] = (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) / scale;
@@ -91,7 +91,7 @@ static __attribute__((noinline)) void kernel_compute_tet_line_field(const kernel
     const grid_field *field = &s->layer->lines->field.fields[part];
     const double *const corner[4] = {world[0], world[1], world[2], world[3]};
     double value[4], g[3];
-    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, vertices[i]);
+    for (int i = 0; i < 4; i++) value[i] = kernel_lines_read_vertex_value(s, field, vertices[i]);
     kernel_tet_gradient(f, corner, value, g);
     /* in tile space the third axis is the direction of the tile's middle ray */
     const double shear[2] = {(double)tile->shear_x, (double)tile->shear_y};
@@ -103,8 +103,8 @@ static __attribute__((noinline)) void kernel_compute_tet_line_field(const kernel
 /* Computes the contour lines' field at the hit at depth t in each lane's tet: out->value holds the field at the tet's
  * last corner, and the field's change from there to the hit is added. last: the corner's position in tile space; along:
  * the field's change per unit of depth along the tile's middle ray. */
-SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_rays *rays, vf t, const vf last[3],
-                                        vf along)
+SIMD_INLINE void kernel_line_field_add_change_to_hit(kernel_line_field *out, const kernel_rays *rays, vf t,
+                                                     const vf last[3], vf along)
 {
     const vf x = (rays->origin_x + rays->slope_x * t) - last[0], y = (rays->origin_y + rays->slope_y * t) - last[1];
     out->value = (out->value + x * out->gradient[0]) + (y * out->gradient[1] + (t - last[2]) * along);
@@ -115,7 +115,7 @@ SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_ray
 SIMD_INLINE void kernel_map_line_field(const kernel_tile *tile, const kernel_map *map, const vf line[8], const vf r[3],
                                        kernel_line_field *out)
 {
-    const kernel_product m = kernel_product_at(map->is_pyramid, r);
+    const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, r);
     vf cross[3][3], n[3], g[3];
     const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
     kernel_polynomial_gradient(map->field, map->is_pyramid, &m, r, n);
@@ -138,7 +138,8 @@ static __attribute__((noinline)) void kernel_curved_line_field(const kernel_pack
     const grid_field *field = &s->layer->lines->field.fields[c->part];
     double value[GRID_MAX_CELL_VERTICES], fit[8];
     vf line[8];
-    for (int i = 0; i < c->count; i++) value[i] = (double)(float)kernel_lines_value(s, field, c->vertices[i]);
+    for (int i = 0; i < c->count; i++)
+        value[i] = (double)(float)kernel_lines_read_vertex_value(s, field, c->vertices[i]);
     kernel_polynomial_fit(fit, c->type, value);
     for (int i = 0; i < 8; i++) line[i] = vf_set((float)fit[i]);
     kernel_map_line_field(p->tile, map, line, r, out);

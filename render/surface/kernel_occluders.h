@@ -146,7 +146,7 @@ typedef struct kernel_prepared_ray {
     float size;
 } kernel_prepared_ray;
 
-SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kernel_prepared_ray *p)
+SIMD_INLINE void kernel_prepared_ray_set_axes(const kernel_secondary_ray *ray, kernel_prepared_ray *p)
 {
     const float x = fabsf(ray->direction[0]), y = fabsf(ray->direction[1]), z = fabsf(ray->direction[2]);
     p->kz = x > y ? (x > z ? 0 : 2) : y > z ? 1 : 2;
@@ -176,13 +176,13 @@ SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, floa
         p->near_row[a] = (inverse < 0 ? 3 + a : a) * SIMD_WIDTH;
         p->far_row[a] = (inverse < 0 ? a : 3 + a) * SIMD_WIDTH;
     }
-    kernel_prepared_ray_axes(ray, p);
+    kernel_prepared_ray_set_axes(ray, p);
 }
 
 /* Returns a mask of the boxes that the ray meets, one box per lane. rows: six rows of one float per lane, x, y, z of
  * the boxes' lower corners and of their upper corners. *low and *high become the distances along the ray at which it
  * enters and leaves the boxes. */
-SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
+SIMD_INLINE vm kernel_prepared_ray_intersect_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);
     *high = vf_set(p->ray->far);
@@ -197,7 +197,7 @@ SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const flo
 
 /* Returns a mask of a leaf's triangles, one per lane, that the ray crosses before its end and not closer to its origin
  * than the triangle's reach (KERNEL_TRIANGLE_REACH). Stores the distances of the crossings in *t. */
-SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const float *rows, vf *t)
+SIMD_INLINE vm kernel_prepared_ray_intersect_triangles(const kernel_prepared_ray *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
     vf x[3], y[3], z[3];
@@ -237,11 +237,11 @@ SIMD_INLINE void kernel_compute_slab_functions(const kernel_prepared_ray *p, con
 
 /* Returns the slabs of a leaf in whose cells the ray may cross the surface: the ray meets the cell's box and, within
  * the box and farther away than the reach, the slab. level, rise, thickness: as in kernel_compute_slab_functions(). */
-SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
-                                         vf *thickness)
+SIMD_INLINE vm kernel_prepared_ray_intersect_slabs(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
+                                                   vf *thickness)
 {
     vf low, high;
-    const vm met = kernel_prepared_ray_boxes(p, rows, &low, &high);
+    const vm met = kernel_prepared_ray_intersect_boxes(p, rows, &low, &high);
     *level = *rise = *thickness = vf_set(0);
     if (!vm_any(met)) return met;
     low = vf_max(0.9999f * vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH), low);

@@ -55,8 +55,8 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_kept_by_clips(const k
     vf_store(depth, t);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
-        const bool is_kept = kernel_clip_keeps(p->frame->job, o->surface->layer->clips, &o->bundle->rays[o->first + i],
-                                               (double)depth[i]);
+        const bool is_kept = kernel_clips_keep_ray_point(p->frame->job, o->surface->layer->clips,
+                                                         &o->bundle->rays[o->first + i], (double)depth[i]);
         kept |= (unsigned)is_kept << i;
     }
     return vm_from_bits(kept);
@@ -77,8 +77,8 @@ SIMD_INLINE vm kernel_deactivate_blocked_rays(kernel_packet *p, const kernel_occ
 
 /* Finds the points in the rays' interval i at which the field is the isovalue, one after the other, until each ray is
  * blocked or has no more such points. */
-SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
-                                        const kernel_interval *i, vm wanted)
+SIMD_INLINE void kernel_occlusion_search_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
+                                               const kernel_interval *i, vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_search s;
@@ -92,11 +92,11 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
 }
 
 /* Removes the rays that the surface in a hex, wedge or pyramid blocks from the packet's active rays. */
-static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, const kernel_occlusion *o,
-                                                              const kernel_cell *c, vm rays)
+static __attribute__((noinline)) void kernel_occlusion_test_curved_cell(kernel_packet *p, const kernel_occlusion *o,
+                                                                        const kernel_cell *c, vm rays)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
+    const kernel_beam beam = kernel_bound_rays_of_tile(p->frame, p->tile);
     float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
     kernel_bounds bounds;
     kernel_curved curved = {.at = at, .colours = colours, .bounds = &bounds};
@@ -104,45 +104,46 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     bool has_bounds = false;
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_interval_changes_sign(i));
         const vm wanted = vm_and(kernel_interval_overlaps_ray(p, i), nonempty);
         if (!vm_any(wanted)) continue;
         if (!has_bounds) kernel_curved_single_bounds(c, &beam, &curved);
         has_bounds = true;
-        kernel_occlusion_roots(p, o, &curved, i, wanted);
+        kernel_occlusion_search_roots(p, o, &curved, i, wanted);
     }
 }
 
 /* Removes the rays that are blocked in their current interval (r->interval) in a polyhedron from the packet's active
  * rays. Crossings of the isovalue are found along each ray's profile, the piecewise linear field on the ray
  * (kernel_polyhedron_surface.h). */
-static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
+static void kernel_occlusion_test_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted,
+                                           kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_prepare_profile(r);
+    kernel_poly_prepare_piecewise_field(r);
     kernel_profile_walk_begin(r, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, &walk);
+        const vm found = kernel_profile_walk_find_crossing(r, &walk);
         walk.open = vm_andnot(walk.open, kernel_deactivate_blocked_rays(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
 
-static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
+static void kernel_occlusion_trace_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
 {
     kernel_poly_crossings r;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_find_next_interval(&r)) {
-        const vm changes = kernel_changes_sign(&r.interval);
+        const vm changes = kernel_interval_changes_sign(&r.interval);
         const vm wanted =
             vm_and(kernel_interval_overlaps_ray(p, &r.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r)));
-        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r);
+        if (vm_any(wanted)) kernel_occlusion_test_interval(p, o, wanted, &r);
     }
 }
 
 /* Removes the rays that the surface in a polyhedron blocks from the packet's active rays. The thread keeps the
  * polyhedron's decomposition into tets for later bundles, but for each bundle the vertices are transformed into its own
  * tile space. */
-static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
+static void kernel_occlusion_test_polyhedron(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const int part = occluder->part;
     const double value = o->surface->layer->values[occluder->value];
@@ -155,7 +156,7 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
     if (!kernel_values_straddle(c->values, c->vertex_count, value)) return;
     kernel_polyhedron_transform(c, p);
     c->scale = kernel_values_subtract_isovalue(c->values, c->vertex_count + 1, value, c->f);
-    kernel_occlusion_polyhedron(p, o, c, p->active);
+    kernel_occlusion_trace_polyhedron(p, o, c, p->active);
 }
 
 /* Transforms the cell into the bundle's tile space. If it has been transformed before, its world coordinates are
@@ -172,13 +173,13 @@ SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell 
 
 /* Removes the rays that the cell's surface blocks from the packet's active rays. The cell is not a tet, because rays
  * are never undecided in tets (kernel_occluders.h). */
-static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
+static void kernel_occlusion_test_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const render_surface_layer *layer = o->surface->layer;
     kernel_cell *c = kernel_cell_cache_find(p, occluder->surface, occluder->part, &layer->field.fields[occluder->part],
                                             occluder->cell);
     if (kernel_has_own_faces(c->type)) {
-        kernel_occlusion_polyhedra(p, o, occluder);
+        kernel_occlusion_test_polyhedron(p, o, occluder);
         return;
     }
     if (!c->is_finite) return;
@@ -186,7 +187,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     o->vertex_count = c->count;
     kernel_occlusion_transform(p, c, occluder->part);
     kernel_cell_subtract_isovalue(c, layer->values[occluder->value]);
-    kernel_occlusion_curved(p, o, c, p->active);
+    kernel_occlusion_test_curved_cell(p, o, c, p->active);
 }
 
 /* Clears the `open` bits of the bundle's rays that the surface in the occluder's cell blocks. */
@@ -197,9 +198,9 @@ static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread,
         kernel_packet p;
         kernel_occlusion o = {&f->surfaces[occluder->surface], b, first, NULL, 0};
         if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
-        kernel_bundle_packet(&p, f, thread, b, first);
+        kernel_packet_set_up_from_bundle(&p, f, thread, b, first);
         const unsigned before = vm_bits(p.active);
-        kernel_occlusion_cell(&p, &o, occluder);
+        kernel_occlusion_test_cell(&p, &o, occluder);
         b->open &= ~((uint64_t)(before & ~vm_bits(p.active)) << first);
     }
 }

@@ -47,7 +47,7 @@ SIMD_INLINE void kernel_pairs_set_ray(const kernel_secondary_ray *ray, int32_t r
                                       kernel_curved_pairs *out)
 {
     kernel_prepared_ray p;
-    kernel_prepared_ray_axes(ray, &p);
+    kernel_prepared_ray_set_axes(ray, &p);
     const int axes[3] = {p.kx, p.ky, p.kz};
     out->record[lane] = record * KERNEL_CURVED_RECORD_WORDS;
     out->axis[lane] = (float)p.kz;
@@ -90,7 +90,7 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
 }
 
 /* Returns L, the linear function of each pair's slab, at the distance t along the ray. */
-SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
+SIMD_INLINE vf kernel_pairs_evaluate_slab_function(const kernel_curved_pairs *pairs, vf t)
 {
     return vf_load(pairs->level) + vf_load(pairs->rise) * t;
 }
@@ -99,7 +99,8 @@ SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
  * slab's thickness, with the same sign. */
 SIMD_INLINE vm kernel_pairs_miss_slab(const kernel_curved_pairs *pairs, vf from, vf to)
 {
-    const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
+    const vf first = kernel_pairs_evaluate_slab_function(pairs, from),
+             last = kernel_pairs_evaluate_slab_function(pairs, to);
     const vf thick = vf_load(pairs->thickness);
     return vm_or(vf_lt(thick, vf_min(first, last)), vf_lt(vf_max(first, last), -thick));
 }
@@ -112,7 +113,7 @@ static __attribute__((noinline)) vm kernel_pairs_are_monotone(const kernel_curve
 {
     static const kernel_beam beam = {.spread = 0};
     kernel_bounds bounds;
-    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->transformed.at, &beam, &bounds);
+    kernel_compute_bounds_of_cells(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->transformed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
@@ -127,7 +128,7 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     vm two;
     vi face[2];
     kernel_point ends[2];
-    kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &two, undecided, face);
+    kernel_curved_find_faces_of_active_rays(&pairs->transformed, &p, GRID_HEX, &two, undecided, face);
     if (!vm_any(two)) return vm_none();
     p.active = two;
     kernel_curved_compute_crossings(&pairs->transformed, &p, GRID_HEX, face[0] | face[1] << 3, ends);

@@ -25,7 +25,8 @@ SIMD_INLINE int32_t kernel_find_next_leaf(const kernel_occluder_tree *tree, int3
         if (at < 0) return (int32_t)~at;
         const int32_t *children = tree->children + at * SIMD_WIDTH;
         vf low, high;
-        unsigned met = vm_bits(kernel_prepared_ray_boxes(p, tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
+        unsigned met =
+            vm_bits(kernel_prepared_ray_intersect_boxes(p, tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
         for (; met; met &= met - 1) stack[(*top)++] = children[__builtin_ctz(met)];
     }
     return -1;
@@ -33,9 +34,10 @@ SIMD_INLINE int32_t kernel_find_next_leaf(const kernel_occluder_tree *tree, int3
 
 /* Returns whether the clips keep at least one of the ray's crossings with triangles. met: mask of the lanes with
  * crossed triangles; surfaces: per lane, index of the triangle's surface; t: distances of the crossings. */
-static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const kernel_frame *f,
-                                                                           const kernel_secondary_ray *ray,
-                                                                           const int32_t *surfaces, unsigned met, vf t)
+static __attribute__((noinline, cold)) bool kernel_has_unclipped_triangle_hit(const kernel_frame *f,
+                                                                              const kernel_secondary_ray *ray,
+                                                                              const int32_t *surfaces, unsigned met,
+                                                                              vf t)
 {
     kernel_clip_ray line;
     for (int a = 0; a < 3; a++) {
@@ -45,7 +47,7 @@ static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const
     for (; met; met &= met - 1) {
         const int i = __builtin_ctz(met);
         const uint32_t clips = f->surfaces[surfaces[i]].layer->clips;
-        if (kernel_clip_keeps(f->job, clips, &line, (double)t[i])) return true;
+        if (kernel_clips_keep_ray_point(f->job, clips, &line, (double)t[i])) return true;
     }
     return false;
 }
@@ -61,10 +63,10 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
     kernel_prepared_ray_begin(ray, tree->size, &p);
     for (int64_t leaf; (leaf = kernel_find_next_leaf(tree, stack, &top, &p)) >= 0;) {
         vf t;
-        const unsigned met =
-            vm_bits(kernel_prepared_ray_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
+        const unsigned met = vm_bits(
+            kernel_prepared_ray_intersect_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
         if (!met) continue;
-        if (!f->job->clip_count || kernel_secondary_ray_unclipped(f, ray, tree->sources + leaf * SIMD_WIDTH, met, t))
+        if (!f->job->clip_count || kernel_has_unclipped_triangle_hit(f, ray, tree->sources + leaf * SIMD_WIDTH, met, t))
             return true;
     }
     return false;
@@ -88,7 +90,7 @@ static bool kernel_list_met_slabs(const kernel_occluders *o, kernel_secondary_ra
     for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_find_next_leaf(tree, stack, &top, &p)) >= 0;) {
         const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
         vf level, rise, thickness; /* L along the ray is level + rise * t */
-        for (unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness)); met;
+        for (unsigned met = vm_bits(kernel_prepared_ray_intersect_slabs(&p, rows, &level, &rise, &thickness)); met;
              met &= met - 1) {
             const int i = __builtin_ctz(met), n = pairs->count;
             const int32_t occluder = tree->sources[leaf * SIMD_WIDTH + i];

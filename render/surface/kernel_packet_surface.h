@@ -16,7 +16,7 @@
 
 /* Computes normals by central differences for the given rays' hits on the opaque surface s. Returns the hits whose
  * normals are known. The other hits need samples of other ranks' cells, and are added to the list of pending hits. */
-SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
+SIMD_INLINE vm kernel_compute_opaque_hit_normals(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     kernel_surface_hits h = {.value = vi_from_vf(hits->kind) - (int)s->first_kind, .t = p->t_far, .reach = hits->reach};
     memcpy(h.normal, hits->normal, sizeof h.normal);
@@ -27,7 +27,7 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
 }
 
 /* Lights the nearest opaque hits and emits them as fragments. */
-SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
+SIMD_INLINE void kernel_emit_opaque_hits(kernel_packet *p, kernel_hits *hits)
 {
     for (int n = 0; n < p->frame->opaque_count; n++) {
         const kernel_surface *s = &p->frame->surfaces[n];
@@ -35,12 +35,12 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
         vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
-        if (s->layer->normal == RENDER_DIFFERENCES) write = kernel_opaque_differences(p, s, write, hits);
+        if (s->layer->normal == RENDER_DIFFERENCES) write = kernel_compute_opaque_hit_normals(p, s, write, hits);
         if (s->layer->normal == RENDER_VERTEX)
             kernel_vertex_normals(p, s, write, p->t_far, hits->part, hits->cell, hits->normal);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
-        kernel_paint(p, s, hits->normal, hits->kind, &lit);
+        kernel_compute_fragment_colours(p, s, hits->normal, hits->kind, &lit);
         kernel_append_fragments(p, write, 0, &lit);
     }
 }
@@ -71,7 +71,7 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
         const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));
         kernel_fragments lit = {
             run.t, run.t, {colour[0], colour[1], colour[2]}, vf_set(opacity < 1 ? 1 - opacity : 0), kind};
-        kernel_paint(&run.packet, run.surface, normal, kind, &lit);
+        kernel_compute_fragment_colours(&run.packet, run.surface, normal, kind, &lit);
         for (int a = 0; a < 3 && opacity < 1; a++) lit.colour[a] *= opacity;
         for (int n = 0; n < run.count; n++) {
             const int lane = run.lanes[n];

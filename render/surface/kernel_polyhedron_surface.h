@@ -57,7 +57,8 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
 /* A polyhedron is divided into tets, each between a surface triangle and the centre; the sign of an inverted tet is -1.
  * Computes, for each hit, the sum of the field's gradients in all tets that contain the hit, each times the tet's sign.
  * Returns the hits for which these signs sum to 1, so that the sum is valid. */
-static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
+static vm kernel_polyhedron_sum_tet_gradients(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t,
+                                              vf out[3])
 {
     vf cover = vf_set(0);
     for (int n = 0; n < r->cell->facet_count; n++) {
@@ -98,7 +99,7 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_c
 {
     int32_t facets[SIMD_WIDTH];
     for (int a = 0; a < 3; a++) out[a] = vf_set(0);
-    if (!r->cell->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, r, hit, t, out));
+    if (!r->cell->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_tet_gradients(p, r, hit, t, out));
     kernel_polyhedron_find_facets(r, hit, t, facets);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
@@ -172,8 +173,8 @@ static __attribute__((noinline)) void kernel_polyhedron_vertex_normals(const ker
 
 /* Computes upper bounds of how fast the field in a tet falls and rises along any of the tile's rays, per unit of depth.
  * spread: upper bound of the rays' |slope_x| and |slope_y|. */
-static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
-                              double *rise)
+static void kernel_bound_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
+                                    double *rise)
 {
     const int centre = c->vertex_count;
     double d[3][3], df[3], g[3];
@@ -184,7 +185,7 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
         d[i][2] = (double)c->z[v] - (double)c->z[centre];
         df[i] = c->values[v] - c->values[centre];
     }
-    kernel_gradient((const double(*)[3])d, df, g);
+    kernel_solve_for_gradient((const double(*)[3])d, df, g);
     const double aside = spread * (fabs(g[0]) + fabs(g[1]));
     *fall = aside - g[2];
     *rise = aside + g[2];
@@ -192,14 +193,14 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
 
 /* Computes c->fall and c->rise: upper bounds of how fast the field falls and rises, per unit of depth, along any of the
  * tile's rays in any of the tets into which the polyhedron is divided. They are infinite if a tet has no volume. */
-static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
+static __attribute__((noinline)) void kernel_polyhedron_bound_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
     c->has_slopes = true;
     c->fall = c->rise = 0;
     for (int i = 0; i < c->facet_count; i++) {
         double fall = (double)INFINITY, rise = (double)INFINITY;
-        if (c->facets[i].sign != 0) kernel_tet_slopes(c, &c->facets[i], spread, &fall, &rise);
+        if (c->facets[i].sign != 0) kernel_bound_tet_slopes(c, &c->facets[i], spread, &fall, &rise);
         if (!(fall <= c->fall)) c->fall = fall <= 1e300 ? fall : (double)INFINITY;
         if (!(rise <= c->rise)) c->rise = rise <= 1e300 ? rise : (double)INFINITY;
     }
@@ -222,7 +223,7 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
     const kernel_interval *i = &r->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
     if (!c->is_star_shaped || !p->is_pencil) return longer;
-    if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
+    if (!c->has_slopes) kernel_polyhedron_bound_slopes(c, p);
     const vf zero = vf_set(0), fall = kernel_scale_slope_bound(c, c->fall), rise = kernel_scale_slope_bound(c, c->rise);
     const vf in = r->in.v, out = r->out.v;
     const vm below = vf_lt(i->v_in, zero);
@@ -259,7 +260,7 @@ static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, k
     walk->below = vf_lt(r->u_in, zero);
     walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
     walk->jump_out = vm_and(rays, vm_xor(vf_lt(r->u_out, zero), vf_lt(i->v_out, zero)));
-    kernel_profile_begin(r, &walk->piece);
+    kernel_begin_linear_pieces(r, &walk->piece);
 }
 
 /* Copies depths, values and colour values at both ends of a piece, on the given rays only. */
@@ -282,13 +283,13 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm le
 {
     kernel_interval next = walk->piece;
     const vf zero = vf_set(0);
-    const vm inside = kernel_profile_continues(r, &next, left);
-    kernel_profile_next(r, vf_select(inside, r->u_out, r->interval.v_out), &next);
+    const vm inside = kernel_has_next_linear_piece(r, &next, left);
+    kernel_find_next_linear_piece(r, vf_select(inside, r->u_out, r->interval.v_out), &next);
     const vm rounding =
-        vm_and(kernel_profile_continues(r, &next, inside), vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
+        vm_and(kernel_has_next_linear_piece(r, &next, inside), vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
     next.v_out = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v_out);
     kernel_copy_piece_ends(left, &next, &walk->piece);
-    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(r, &next, inside)));
+    return vm_and(inside, vm_or(walk->jump_out, kernel_has_next_linear_piece(r, &next, inside)));
 }
 
 /* Returns a number that is larger than t by one or two units in the last place. */
@@ -298,7 +299,7 @@ SIMD_INLINE vf kernel_next_float(vf t)
 }
 
 /* Finds the next crossing of each ray in walk->open, and returns the rays that have one. */
-static vm kernel_profile_walk_next(const kernel_poly_crossings *r, kernel_profile_walk *walk)
+static vm kernel_profile_walk_find_crossing(const kernel_poly_crossings *r, kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
@@ -329,7 +330,8 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     int32_t facets[SIMD_WIDTH];
     double mean = 0;
     kernel_polyhedron_find_facets(r, hit, t, facets);
-    for (int i = 0; i < c->vertex_count; i++) mean += kernel_lines_value(s, field, c->vertices[i]) / c->vertex_count;
+    for (int i = 0; i < c->vertex_count; i++)
+        mean += kernel_lines_read_vertex_value(s, field, c->vertices[i]) / c->vertex_count;
     *out = (kernel_line_field){.value = vf_set(NAN)};
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
@@ -340,7 +342,7 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
         kernel_polyhedron_barycentric(p, c, facets[ray], ray, t[ray], corners, share);
         for (int i = 0; i < 4; i++) {
             corner[i] = c->world[corners[i]];
-            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[corners[i]]) : mean;
+            value[i] = i < 3 ? kernel_lines_read_vertex_value(s, field, c->vertices[corners[i]]) : mean;
         }
         kernel_tet_gradient(p->frame, corner, value, g);
         kernel_polyhedron_gradient(p, c, facets[ray], n);
@@ -380,10 +382,10 @@ static void kernel_polyhedron_accept_crossings(kernel_packet *p, const kernel_su
                                                kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_prepare_profile(r);
+    kernel_poly_prepare_piecewise_field(r);
     kernel_profile_walk_begin(r, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, &walk);
+        const vm found = kernel_profile_walk_find_crossing(r, &walk);
         const vm kept = kernel_unclipped_hits(p, s, found, walk.t);
         kernel_polyhedron_accept(p, s, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (kernel_is_opaque(p, s)) walk.open = vm_andnot(walk.open, kept);
@@ -399,14 +401,15 @@ static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s,
     while (kernel_poly_find_next_interval(&r)) {
         const vm near = kernel_interval_overlaps_ray(p, &r.interval);
         if (!vm_any(near)) continue;
-        const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&r.interval), kernel_polyhedron_may_cross(p, c, &r)));
+        const vm wanted =
+            vm_and(near, vm_or(kernel_interval_changes_sign(&r.interval), kernel_polyhedron_may_cross(p, c, &r)));
         if (vm_any(wanted)) kernel_polyhedron_accept_crossings(p, s, value, wanted, &r);
     }
 }
 
 /* Traces the surfaces of all isovalues of a layer in a polyhedron. part, index: mesh part, and index of the polyhedron
  * in it. */
-static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s, int part, uint32_t index, vm rays)
+static void kernel_polyhedron_trace_layer(kernel_packet *p, const kernel_surface *s, int part, uint32_t index, vm rays)
 {
     const render_surface_layer *layer = s->layer;
     polyhedron *c = kernel_polyhedron_find(p, &layer->field.fields[part], part, (int)(s - p->frame->surfaces), index);

@@ -78,7 +78,7 @@ typedef struct kernel_search {
     kernel_point low, high;
 } kernel_search;
 
-SIMD_INLINE void kernel_search_bounds(const kernel_bounds *b, vi lane, kernel_search *out)
+SIMD_INLINE void kernel_search_gather_bounds(const kernel_bounds *b, vi lane, kernel_search *out)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
@@ -130,7 +130,8 @@ SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point 
 {
     const bool is_pyramid = s->map.is_pyramid;
     const vf side = s->side;
-    const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
+    const kernel_product m[2] = {kernel_compute_coordinate_product(is_pyramid, from->r),
+                                 kernel_compute_coordinate_product(is_pyramid, to->r)};
     vf move[3], g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
     kernel_polynomial_gradient(s->map.field, is_pyramid, &m[0], from->r, g0);
@@ -169,9 +170,9 @@ SIMD_INLINE vf kernel_sign_of(vf v)
 
 /* Sets at->value to the field in the cell at the point *at of each ray, which lies on a face. face: the value
  * interpolated on the face alone; it is stored instead if the two values differ only by rounding. */
-SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf face, kernel_point *at)
+SIMD_INLINE void kernel_search_evaluate_inside_face(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
-    const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
+    const vf inside = kernel_evaluate_field_on_rays(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
@@ -181,7 +182,7 @@ SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf 
 SIMD_INLINE vf kernel_face_distance_from_ray(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map *map = &s->map;
-    const kernel_product m = kernel_product_at(map->is_pyramid, at->r);
+    const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, at->r);
     vf target[3], off[3], sum = vf_set(0);
     kernel_rays_at(&s->rays, map, at->t, target);
     for (int a = 0; a < 3; a++)
@@ -197,7 +198,7 @@ SIMD_INLINE vf kernel_face_distance_from_ray(const kernel_search *s, const kerne
 /* Initializes a search in which only the ends of the interval are known. */
 SIMD_INLINE void kernel_search_begin(kernel_search *s)
 {
-    kernel_point_ends(s->interval, &s->low, &s->high);
+    kernel_get_points_at_interval_ends(s->interval, &s->low, &s->high);
     s->from = s->low;
     s->end = s->high;
     s->side = kernel_sign_of(s->interval->v_in);
@@ -208,7 +209,7 @@ SIMD_INLINE void kernel_search_begin(kernel_search *s)
 
 /* Returns the value, at depth t on each ray, of the linear function L that approximates the field in the ray's cell
  * (kernel_bounds.h). */
-SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
+SIMD_INLINE vf kernel_evaluate_linear_approximation(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
@@ -233,8 +234,8 @@ SIMD_INLINE vm kernel_decide_by_ends(const kernel_curved *c, const kernel_rays *
     const vm searched = vm_andnot(vm_andnot(left, monotone), change);
     if (!vm_any(searched)) return left;
     const vf thick = kernel_gather_lane(c->bounds->thickness, lane);
-    const vm far = vm_and(vf_lt(thick, side * kernel_linear_at(c, rays, lane, in->t)),
-                          vf_lt(thick, side * kernel_linear_at(c, rays, lane, out->t)));
+    const vm far = vm_and(vf_lt(thick, side * kernel_evaluate_linear_approximation(c, rays, lane, in->t)),
+                          vf_lt(thick, side * kernel_evaluate_linear_approximation(c, rays, lane, out->t)));
     return vm_andnot(left, vm_and(searched, far));
 }
 
@@ -255,8 +256,8 @@ SIMD_INLINE void kernel_search_test_whole(kernel_search *s, vm rays)
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
-    kernel_search_value_inside(s, s->open, i->v_in, &s->from);
-    kernel_search_value_inside(s, s->open, i->v_out, &s->end);
+    kernel_search_evaluate_inside_face(s, s->open, i->v_in, &s->from);
+    kernel_search_evaluate_inside_face(s, s->open, i->v_out, &s->end);
     /* the field just inside a warped face may have the other sign than the face's value: then there is a root at the
      * face itself */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_sign_of(s->from.value), s->side));
@@ -280,16 +281,16 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     kernel_search_begin(s);
     wanted = kernel_decide_by_ends(c, rays, lane, wanted, &s->low, &s->high, &s->found);
     if (!vm_any(vm_or(wanted, s->found))) return false;
-    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])c->at, lane, c->type, &s->map);
+    kernel_compute_maps((const float(*)[8][SIMD_WIDTH])c->at, lane, c->type, &s->map);
     if (vm_any(wanted)) {
-        kernel_search_bounds(c->bounds, lane, s);
+        kernel_search_gather_bounds(c->bounds, lane, s);
         kernel_search_test_whole(s, wanted);
     }
     return true;
 }
 
 /* Computes the end of each ray's current piece: depth, reference coordinates and field. */
-SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_point *to)
+SIMD_INLINE void kernel_search_compute_piece_end(const kernel_search *s, vm rays, kernel_point *to)
 {
     const kernel_interval *i = s->interval;
     const vf u = (s->number + 1.0f) * s->size;
@@ -298,7 +299,7 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     if (!vm_any(inner)) return;
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
     kernel_reference_between(&s->from, &s->end, at.t, at.r);
-    at.value = kernel_solve_lanes(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
+    at.value = kernel_evaluate_field_on_rays(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
     kernel_point_copy_lanes(inner, &at, to);
 }
 
@@ -317,14 +318,14 @@ SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_p
 }
 
 /* Advances each open ray, piece by piece, until a root is isolated on it or its pieces are exhausted. */
-SIMD_INLINE void kernel_search_next(kernel_search *s)
+SIMD_INLINE void kernel_search_isolate_next_root(kernel_search *s)
 {
     vm going = s->open;
     s->found = vm_none();
     while (vm_any(going)) {
         kernel_point to;
         vm monotone, negligible;
-        kernel_search_piece(s, going, &to);
+        kernel_search_compute_piece_end(s, going, &to);
         const vm clear = kernel_classify_piece(s, &s->from, &to, vf_set(0), &monotone, &negligible);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
@@ -360,7 +361,7 @@ SIMD_INLINE void kernel_search_test_exit_faces(kernel_search *s)
 static __attribute__((noinline, unused)) bool kernel_search_continue(kernel_search *s)
 {
     if (vm_any(s->open))
-        kernel_search_next(s);
+        kernel_search_isolate_next_root(s);
     else if (vm_any(s->ended))
         kernel_search_test_exit_faces(s);
     else
@@ -384,7 +385,7 @@ SIMD_INLINE void kernel_refine_by_bracketing(const kernel_search *s, vm rays, ke
         kernel_point at = {.t = kernel_secant(low.t, low.value, high.t, high.value)};
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
         kernel_reference_between(&low, &high, at.t, at.r);
-        at.value = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
+        at.value = kernel_evaluate_field_on_rays(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
         const vm same = vf_eq(kernel_sign_of(at.value), kernel_sign_of(low.value));
         kernel_point_copy_lanes(rays, &at, out);
         high.value = vf_select(same, high.value * 0.5f, high.value);
@@ -399,7 +400,7 @@ SIMD_INLINE void kernel_refine_by_bracketing(const kernel_search *s, vm rays, ke
 
 /* Returns the value at the reference coordinates r of the polynomial with the coefficients c (kernel_map.h). m: the
  * product r[0] * r[1], for a pyramid divided by r[2]. */
-SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
+SIMD_INLINE kernel_f64 kernel_f64_evaluate_polynomial(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
@@ -425,8 +426,8 @@ SIMD_INLINE void kernel_compute_residuals(const kernel_rays *rays, const kernel_
         for (int a = 0; a < 3; a++)
             kernel_f64_store_half_of_vector(&off[a], half,
                                             target[a] - kernel_f64_widen_half(&map->origin[a], half) -
-                                                kernel_f64_value(map->exact[half][a], r, m));
-        kernel_f64_store_half_of_vector(value, half, kernel_f64_value(map->exact[half][3], r, m));
+                                                kernel_f64_evaluate_polynomial(map->exact[half][a], r, m));
+        kernel_f64_store_half_of_vector(value, half, kernel_f64_evaluate_polynomial(map->exact[half][3], r, m));
     }
 }
 
@@ -437,7 +438,7 @@ SIMD_INLINE vm kernel_take_root_newton_step(const kernel_rays *rays, const kerne
                                             const kernel_point *high, vm wanted, const vf off[3], vf value,
                                             kernel_point *out)
 {
-    const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+    const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, out->r);
     const vf zero = vf_set(0);
     vf cross[3][3], gradient[3], step[3], speed[3], largest = zero;
     const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, out->r, cross);
@@ -495,7 +496,7 @@ SIMD_INLINE vm kernel_refine_roots_by_newton(const kernel_rays *rays, const kern
     out->value = zero;
     for (int a = 0; a < 3; a++) out->r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
     for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
-        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+        const kernel_product m = kernel_compute_coordinate_product(map->is_pyramid, out->r);
         vf off[3];
         kernel_rays_at(rays, map, out->t, off);
         for (int a = 0; a < 3; a++) off[a] -= kernel_polynomial_value(map->position[a], map->is_pyramid, &m, out->r);

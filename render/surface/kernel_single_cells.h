@@ -13,21 +13,21 @@
  * `curved` hold a hex, wedge or pyramid in tile space, in which the surface of the isovalue with the index `value` is
  * traced. If it is NULL, the cell is the polyhedron with this part and index, in which the surfaces of all of the
  * layer's isovalues are traced. */
-static __attribute__((noinline)) void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part,
-                                                          uint32_t index, const kernel_cell *cell,
-                                                          const kernel_curved *curved, int value)
+static __attribute__((noinline)) void kernel_trace_cell_in_blocks(kernel_tile_trace *t, unsigned blocks, int part,
+                                                                  uint32_t index, const kernel_cell *cell,
+                                                                  const kernel_curved *curved, int value)
 {
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
         bool is_nearer = false;
-        kernel_block_begin(t, block);
+        kernel_block_set_up_packets(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             kernel_packet *p = &t->packets[block * KERNEL_BLOCK_PACKETS + n];
             p->is_nearer = false;
             if (cell)
-                kernel_curved_surface(p, t->surface, cell, curved, value, p->active);
+                kernel_curved_trace_isovalue(p, t->surface, cell, curved, value, p->active);
             else
-                kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
+                kernel_polyhedron_trace_layer(p, t->surface, part, index, p->active);
             is_nearer = is_nearer || p->is_nearer;
         }
         if (is_nearer) kernel_block_update_far(t, block);

@@ -54,21 +54,22 @@ SIMD_INLINE vm kernel_hit_normals(kernel_packet *p, const kernel_surface *s, vm 
 
 /* Computes the normals of tied hits (hits with the same depth as their ray's nearest hit), and emits these hits as
  * fragments of their own. */
-static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
-                                                                      vm tied, const kernel_surface_hits *h)
+static __attribute__((noinline, cold)) void kernel_accept_hits_of_equal_depth(kernel_packet *p, const kernel_surface *s,
+                                                                              vm tied, const kernel_surface_hits *h)
 {
     kernel_surface_hits own = *h;
     const vm ready = kernel_hit_normals(p, s, tied, &own);
-    kernel_emit_tied(p, s, ready, &own);
+    kernel_emit_hits_of_equal_depth(p, s, ready, &own);
 }
 
 /* Stores hits of an opaque surface as the nearest ones of their rays. */
-SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, const kernel_surface *s, vm hit, const kernel_surface_hits *h)
+SIMD_INLINE void kernel_accept_opaque_hits(kernel_packet *p, const kernel_surface *s, vm hit,
+                                           const kernel_surface_hits *h)
 {
     kernel_hits *hits = p->hits;
     const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(h->t, p->t_far));
     if (__builtin_expect(vm_any(tied), 0)) {
-        kernel_accept_equal_depth(p, s, tied, h);
+        kernel_accept_hits_of_equal_depth(p, s, tied, h);
         hit = vm_andnot(hit, tied);
     }
     p->t_far = vf_select(hit, h->t, p->t_far);
@@ -93,7 +94,7 @@ static __attribute__((noinline)) void kernel_emit_transparent(kernel_packet *p, 
     const vf kind = kernel_hit_kinds(s, h);
     hit = kernel_hit_normals(p, s, hit, h);
     kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, kind};
-    kernel_paint(p, s, h->normal, kind, &f);
+    kernel_compute_fragment_colours(p, s, h->normal, kind, &f);
     for (int a = 0; a < 3; a++) f.colour[a] *= h->opacity;
     kernel_append_fragments(p, hit, 0, &f);
 }
@@ -102,8 +103,8 @@ static __attribute__((noinline)) void kernel_emit_transparent(kernel_packet *p, 
  * multiplies the hits' opacities by the share of the pixel that a line covers, and returns the hits on a line.
  * Otherwise returns all hits. In a picture of values (RENDER_VALUES) no colours are drawn. If only the lines are drawn
  * there, and the surface has no colour field, a hit's value (h->colour[0]) becomes that of the lines' field. */
-static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
-                                                        kernel_surface_hits *h)
+static __attribute__((noinline)) vm kernel_draw_lines_on_hits(const kernel_packet *p, const kernel_surface *s, vm hit,
+                                                              kernel_surface_hits *h)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const bool is_alone = s->layer->lines->is_alone, are_numbers = p->frame->job->paint == RENDER_VALUES;
@@ -119,16 +120,16 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
 }
 
 /* Computes the colours of hits before lighting, with edges and contour lines, and their opacities. The caller must have
- * set the other members of *h. Returns the visible hits (kernel_accept_lines()). */
+ * set the other members of *h. Returns the visible hits (kernel_draw_lines_on_hits()). */
 SIMD_INLINE vm kernel_colour_hits(const kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
     kernel_unlit_surface_colour(s, h->value, h->w, h->colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
-        h->colour[0] = kernel_surface_value(s, h->value, h->w);
+        h->colour[0] = kernel_compute_displayed_value(s, h->value, h->w);
     else if (s->layer->edge_width > 0 && h->vertex_count)
         kernel_draw_edges(p, s->layer, hit, h);
     h->opacity = vf_set(s->layer->opacity);
-    return __builtin_expect(h->along != NULL, 0) ? kernel_accept_lines(p, s, hit, h) : hit;
+    return __builtin_expect(h->along != NULL, 0) ? kernel_draw_lines_on_hits(p, s, hit, h) : hit;
 }
 
 /* Accepts the hits of a packet of the tile: a hit of an opaque surface is stored as the nearest hit of its ray; hits of
@@ -138,7 +139,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit
 {
     hit = kernel_colour_hits(p, s, hit, h);
     if (kernel_is_opaque(p, s)) {
-        kernel_accept_opaque(p, s, hit, h);
+        kernel_accept_opaque_hits(p, s, hit, h);
         return;
     }
     for (unsigned left = p->frame->volume_count ? vm_bits(hit) : 0; left; left &= left - 1) {
@@ -149,19 +150,19 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit
 }
 
 /* Returns the value of a field at the reference coordinates r, in each ray's own cell. values: the field by vertex and
- * lane; lane: the lane that holds each ray's cell. kernel_maps_value() computes the same, but is inlined separately for
- * each cell type. */
-static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
-                                                              int type)
+ * lane; lane: the lane that holds each ray's cell. kernel_maps_evaluate_field() computes the same, but is inlined
+ * separately for each cell type. */
+static __attribute__((noinline)) vf kernel_interpolate_value_in_cells(const float (*values)[SIMD_WIDTH], vi lane,
+                                                                      const vf r[3], int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
+    return KERNEL_OF_TYPE(type, kernel_maps_evaluate_field, values, lane, r);
 }
 
 /* Accepts those of the found crossings of the isovalue in a hex, wedge or pyramid that are visible, and returns them.
  * at: the crossings. */
-SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
-                                    const kernel_curved *curved, int value, const kernel_map *map, vm found,
-                                    const kernel_point *at)
+SIMD_INLINE vm kernel_curved_accept_visible_roots(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
+                                                  const kernel_curved *curved, int value, const kernel_map *map,
+                                                  vm found, const kernel_point *at)
 {
     const vm hit = kernel_visible_hits(p, s, found, at->t);
     if (!vm_any(hit)) return hit;
@@ -177,12 +178,12 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
     if (s->layer->normal == RENDER_VERTEX) {
         memcpy(h.normal, at->r, sizeof h.normal);
     } else {
-        kernel_lanes_normal(map, at->r, h.normal);
+        kernel_compute_gradient_direction(map, at->r, h.normal);
         kernel_gradient_to_camera_axes(p->tile, h.normal);
     }
     if (s->layer->colour_map)
-        h.w = kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])curved->colours, vi_set(curved->lane), at->r,
-                                        curved->type);
+        h.w = kernel_interpolate_value_in_cells((const float(*)[SIMD_WIDTH])curved->colours, vi_set(curved->lane),
+                                                at->r, curved->type);
     kernel_line_field along;
     if (s->layer->lines) {
         kernel_curved_line_field(p, s, c, map, at->r, &along);
@@ -205,13 +206,13 @@ SIMD_INLINE void kernel_accept_searched_roots(kernel_packet *p, const kernel_sur
         kernel_point at;
         if (!vm_any(search.found)) continue;
         kernel_refine_roots(&search, &at);
-        const vm hit = kernel_curved_accept(p, s, c, curved, value, &search.map, search.found, &at);
+        const vm hit = kernel_curved_accept_visible_roots(p, s, c, curved, value, &search.map, search.found, &at);
         if (kernel_is_opaque(p, s)) kernel_search_close(&search, hit);
     } while (kernel_search_continue(&search));
 }
 
-SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
-                                      kernel_point *out, vm *none, int type)
+SIMD_INLINE void kernel_find_contracted_roots_of_type(const kernel_curved *c, const kernel_rays *rays, vi lane,
+                                                      vm wanted, kernel_point *out, vm *none, int type)
 {
     kernel_contraction contraction;
     kernel_contraction_set_ray(c, rays, lane, &contraction);
@@ -222,37 +223,38 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
 
 /* Computes the only crossing of each ray of a packet in one cell by contraction
  * (kernel_find_only_root_by_contraction()), without intersecting the cell's faces. */
-static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
-                                                             vm wanted, kernel_point *out, vm *none)
+static __attribute__((noinline)) void kernel_find_contracted_roots(const kernel_curved *c, const kernel_rays *rays,
+                                                                   vi lane, vm wanted, kernel_point *out, vm *none)
 {
-    KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out, none);
+    KERNEL_OF_TYPE(c->type, kernel_find_contracted_roots_of_type, c, rays, lane, wanted, out, none);
 }
 
 /* Finds crossings of the isovalue by contraction (a fixed-point iteration, kernel_contraction.h), and accepts them.
  * Returns the rays that contraction has decided: those with exactly one crossing, and those without one. */
-static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, const kernel_surface *s,
-                                                                    const kernel_cell *c, const kernel_curved *curved,
-                                                                    int value, vm wanted)
+static __attribute__((noinline)) vm kernel_curved_accept_contracted_roots(kernel_packet *p, const kernel_surface *s,
+                                                                          const kernel_cell *c,
+                                                                          const kernel_curved *curved, int value,
+                                                                          vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const vi lane = vi_set(curved->lane);
     kernel_point at;
     vm none;
-    kernel_contract_packet(curved, &rays, lane, wanted, &at, &none);
+    kernel_find_contracted_roots(curved, &rays, lane, wanted, &at, &none);
     if (vm_any(at.mask)) {
         kernel_map map;
-        kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])curved->at, lane, curved->type, &map);
+        kernel_compute_maps((const float(*)[8][SIMD_WIDTH])curved->at, lane, curved->type, &map);
         kernel_refine_accurate_roots(&rays, &map, at.mask, &at);
-        kernel_curved_accept(p, s, c, curved, value, &map, at.mask, &at);
+        kernel_curved_accept_visible_roots(p, s, c, curved, value, &map, at.mask, &at);
     }
     return vm_or(at.mask, none);
 }
 
 /* Traces one isovalue's surface in a hex, wedge or pyramid with finite values, which must have been transformed into
  * tile space. value: index of the isovalue in the layer. */
-static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, const kernel_surface *s,
-                                                            const kernel_cell *c, const kernel_curved *curved,
-                                                            int value, vm rays)
+static __attribute__((noinline)) void kernel_curved_trace_isovalue(kernel_packet *p, const kernel_surface *s,
+                                                                   const kernel_cell *c, const kernel_curved *curved,
+                                                                   int value, vm rays)
 {
     const render_surface_layer *layer = s->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -260,15 +262,15 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
     vm reached[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
+        i->v_out = kernel_move_end_value_into_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its bilinear patch, both ends of the interval are the same
          * point beside the ray; such an interval is skipped. */
-        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_interval_changes_sign(i));
         reached[n] = vm_and(kernel_interval_overlaps_ray(p, i), nonempty);
         any = vm_or(any, reached[n]);
     }
     if (!vm_any(any)) return;
-    if (!curved->is_contracted) known = kernel_curved_accept_contracted(p, s, c, curved, value, any);
+    if (!curved->is_contracted) known = kernel_curved_accept_contracted_roots(p, s, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(reached[n], kernel_interval_overlaps_ray(p, i)), known);

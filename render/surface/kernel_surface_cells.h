@@ -26,7 +26,7 @@ typedef struct kernel_surface_cells {
      * only if normals come from differences */
     float reach[SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
-    /* by vertex and lane: index of the vertex in `arrays` (kernel_surface_cells_index()) */
+    /* by vertex and lane: index of the vertex in `arrays` (kernel_surface_cells_get_mesh_index()) */
     int32_t vertex[8][SIMD_WIDTH];
     /* The following members are used only if the mesh part's indices do not fit in 32 bits. index: indices of the
      * vertices in the mesh part, by vertex and lane; copied: their three coordinates and their values. */
@@ -44,12 +44,13 @@ static inline void kernel_surface_cells_set_part(kernel_surface_cells *own, int 
     own->arrays = *arrays;
     for (int n = 0; !arrays->has_lanes && n < 4; n++) {
         const grid_array copy = {.data = (const char *)own->copied[n], .stride = sizeof(double), .is_wide = true};
-        *(n < 3 ? &own->arrays.coordinates[n] : &own->arrays.values) = kernel_numbers_of(&copy, 8 * SIMD_WIDTH);
+        *(n < 3 ? &own->arrays.coordinates[n] : &own->arrays.values) =
+            kernel_numbers_describe_array(&copy, 8 * SIMD_WIDTH);
     }
 }
 
 /* Returns the index in the mesh part of the vertex that has the index `vertex` in own->arrays. */
-SIMD_INLINE int64_t kernel_surface_cells_index(const kernel_surface_cells *own, int32_t vertex)
+SIMD_INLINE int64_t kernel_surface_cells_get_mesh_index(const kernel_surface_cells *own, int32_t vertex)
 {
     return own->arrays.has_lanes ? vertex : own->index[vertex];
 }
@@ -59,7 +60,7 @@ SIMD_INLINE int64_t kernel_surface_cells_index(const kernel_surface_cells *own, 
 static __attribute__((noinline)) void kernel_surface_cells_set_vertices(kernel_surface_cells *own, int n,
                                                                         const int64_t *vertices)
 {
-    for (int i = 0; i < grid_type_vertices(own->type); i++) {
+    for (int i = 0; i < grid_type_vertex_count(own->type); i++) {
         const int at = i * SIMD_WIDTH + n;
         own->vertex[i][n] = own->arrays.has_lanes ? (int32_t)vertices[i] : at;
         own->index[at] = vertices[i];
@@ -84,19 +85,20 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
     if (__builtin_expect(vertices != NULL, 0))
         kernel_surface_cells_set_vertices(own, n, vertices);
     else
-        kernel_arrays_vertices_of_any(&own->arrays, candidate->cell, grid_type_vertices(own->type), own->vertex[0] + n,
-                                      SIMD_WIDTH);
+        kernel_arrays_read_indices_of_any_type(&own->arrays, candidate->cell, grid_type_vertex_count(own->type),
+                                               own->vertex[0] + n, SIMD_WIDTH);
 }
 
 /* Copies the coordinates and values of the queued cells' vertices to own->copied; used if the mesh part's indices do
  * not fit in 32 bits. */
-static __attribute__((noinline)) void kernel_surface_cells_copy(const kernel_tile_trace *t, kernel_surface_cells *own)
+static __attribute__((noinline)) void kernel_surface_cells_copy_vertices(const kernel_tile_trace *t,
+                                                                         kernel_surface_cells *own)
 {
     const grid_field *field = &t->surface->layer->field.fields[own->part];
-    for (int i = 0; i < grid_type_vertices(own->type); i++)
+    for (int i = 0; i < grid_type_vertex_count(own->type); i++)
         for (int at = i * SIMD_WIDTH; at < i * SIMD_WIDTH + own->count; at++) {
             double world[3];
-            grid_vertex(own->arrays.cells, own->index[at], world);
+            grid_read_vertex_position(own->arrays.cells, own->index[at], world);
             for (int a = 0; a < 3; a++) own->copied[a][at] = world[a];
             own->copied[3][at] = grid_field_value(field, own->index[at]);
         }
@@ -109,11 +111,11 @@ static __attribute__((noinline)) void kernel_surface_cells_read_colours(const ke
                                                                         const int32_t (*vertex)[SIMD_WIDTH],
                                                                         float (*out)[SIMD_WIDTH])
 {
-    const int count = grid_type_vertices(own->type);
+    const int count = grid_type_vertex_count(own->type);
     for (int n = 0; n < own->count; n++) {
         int64_t vertices[8];
         float values[8];
-        for (int i = 0; i < count; i++) vertices[i] = kernel_surface_cells_index(own, vertex[i][n]);
+        for (int i = 0; i < count; i++) vertices[i] = kernel_surface_cells_get_mesh_index(own, vertex[i][n]);
         kernel_read_colour_values(s, own->part, own->cell[n], vertices, count, values);
         for (int i = 0; i < count; i++) out[i][n] = values[i];
     }
@@ -132,7 +134,7 @@ SIMD_INLINE unsigned kernel_surface_cells_visible_blocks(const kernel_tile_trace
  * can be transformed. */
 SIMD_INLINE void kernel_surface_cells_fill_lanes(const kernel_tile_trace *t, kernel_surface_cells *own)
 {
-    if (__builtin_expect(!own->arrays.has_lanes, 0)) kernel_surface_cells_copy(t, own);
+    if (__builtin_expect(!own->arrays.has_lanes, 0)) kernel_surface_cells_copy_vertices(t, own);
     for (int n = own->count; n < SIMD_WIDTH; n++) {
         for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
         own->isovalue[n] = own->isovalue[0];

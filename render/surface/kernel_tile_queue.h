@@ -18,7 +18,7 @@
 
 /* Makes the surface layer to which a candidate belongs the tile's current layer. source: kernel_candidate.source.
  * Stores the candidate's mesh part in *part, and returns the index of its isovalue in the layer. */
-SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
+SIMD_INLINE int kernel_tile_set_layer_of_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     *part = (int)(source / RENDER_MAX_ISOVALUES);
     kernel_tile_set_layer(t, t->frame->isovalue_surface[source % RENDER_MAX_ISOVALUES]);
@@ -86,9 +86,9 @@ static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_search *m,
     if (!own->count) return;
     kernel_tile_set_layer(t, own->layer);
     if (kernel_is_linear(own->type))
-        kernel_batch_process(t, &m->batch, own);
+        kernel_batch_trace_queued_cells(t, &m->batch, own);
     else
-        kernel_curved_batch_process(t, &m->curved_batch, own);
+        kernel_curved_batch_trace_queued_cells(t, &m->curved_batch, own);
     kernel_tile_set_layer(t, layer);
 }
 
@@ -113,8 +113,9 @@ static void kernel_tile_queue_trace_polyhedra(kernel_tile_trace *t, kernel_tile_
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
     for (int n = 0; n < m->polyhedron_count; n++) {
         int part;
-        kernel_tile_set_source(t, m->polyhedra[n].source, &part);
-        kernel_blocks_trace(t, kernel_candidate_blocks(t, &m->polyhedra[n]), part, m->polyhedra[n].cell, NULL, NULL, 0);
+        kernel_tile_set_layer_of_source(t, m->polyhedra[n].source, &part);
+        kernel_trace_cell_in_blocks(t, kernel_candidate_blocks(t, &m->polyhedra[n]), part, m->polyhedra[n].cell, NULL,
+                                    NULL, 0);
     }
     m->polyhedron_count = 0;
 }

@@ -38,8 +38,8 @@ static bool kernel_queue_found_candidates(kernel_candidate_list *list)
     for (int n = 0; n < list->count; n++) {
         const kernel_candidate *found = &list->items[n];
         int part;
-        const int value = kernel_tile_set_source(t, found->source, &part);
-        const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
+        const int value = kernel_tile_set_layer_of_source(t, found->source, &part);
+        const kernel_tile_candidate candidate = kernel_convert_candidate_to_tile(found, t->tile.x0, t->tile.y0);
         if (kernel_candidate_blocks(t, &candidate) && kernel_box_has_pixel_not_hidden_at(t, candidate.box, found->near))
             kernel_tile_queue_add(t, s, &candidate, part, value);
     }
@@ -49,7 +49,7 @@ static bool kernel_queue_found_candidates(kernel_candidate_list *list)
 
 /* Prepares the search for cells of a mesh part, unless that part is being searched already. Cells of the previous part
  * that the finder has collected are processed first. */
-static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
+static void kernel_tile_set_searched_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
     if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
@@ -215,8 +215,9 @@ SIMD_INLINE int kernel_push_visible_node(const mmbvh *tree, const mmbvh_ranges *
 /* Tests the children of `count` inner nodes, and pushes those that may be visible on the stack, so that the nearest are
  * on top. left: index of each inner node's left child, the nearest inner node first. Returns the number of pushed
  * nodes. */
-SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                          const int64_t *left, int count, kernel_tile_node *stack)
+SIMD_INLINE int kernel_tile_push_visible_children(const kernel_tile_trace *t, const mmbvh *tree,
+                                                  const mmbvh_ranges *ranges, const int64_t *left, int count,
+                                                  kernel_tile_node *stack)
 {
     int64_t node[SIMD_WIDTH];
     kernel_node_lanes lanes;
@@ -253,13 +254,13 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_box_has_pixel_not_hidden_at(t, e.place, e.near)) continue;
             if (e.count) {
-                kernel_tile_find_set_part(t, t->search, part);
+                kernel_tile_set_searched_part(t, t->search, part);
                 kernel_queue_leaf_cells(t->thread->finder, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
         }
-        if (inner_count) top += kernel_tile_find_children(t, tree, ranges, inner, inner_count, stack + top);
+        if (inner_count) top += kernel_tile_push_visible_children(t, tree, ranges, inner, inner_count, stack + top);
     }
 }
 
@@ -302,7 +303,7 @@ SIMD_INLINE void kernel_set_pixel_box_scales(kernel_tile_trace *t)
 }
 
 /* Traces the surfaces of all layers. */
-static void kernel_tile_surfaces(kernel_tile_trace *t)
+static void kernel_tile_trace_all_layers(kernel_tile_trace *t)
 {
     kernel_tile_search *s = t->search;
     s->tile = t;

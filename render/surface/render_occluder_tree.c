@@ -64,7 +64,7 @@ static void compute_node_boxes(widening *w)
     }
 }
 
-static float area_of(const float box[6])
+static float compute_half_box_area(const float box[6])
 {
     const float x = box[3] - box[0], y = box[4] - box[1], z = box[5] - box[2];
     return x * y + y * z + z * x;
@@ -84,7 +84,7 @@ static piece_range node_range(const widening *w, int64_t node)
     return out;
 }
 
-static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
+static piece_range make_range_of_leaf_pieces(const widening *w, int64_t first, int64_t count)
 {
     piece_range out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
     float lower[3], upper[3];
@@ -97,15 +97,15 @@ static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
 
 /* Divides a range into two: an inner node's range into those of its children, and the pieces of a leaf or of a part of
  * a leaf into halves. The range must have more pieces than there are lanes. */
-static void divide(const widening *w, const piece_range *whole, piece_range out[2])
+static void divide_piece_range(const widening *w, const piece_range *whole, piece_range out[2])
 {
     const int64_t half = whole->count / 2;
     if (whole->node >= 0 && !mmbvh_node_count(w->binary, whole->node)) {
         for (int n = 0; n < 2; n++) out[n] = node_range(w, mmbvh_node_ref(w->binary, whole->node) + n);
         return;
     }
-    const piece_range both[2] = {leaf_part(w, whole->first, half),
-                                 leaf_part(w, whole->first + half, whole->count - half)};
+    const piece_range both[2] = {make_range_of_leaf_pieces(w, whole->first, half),
+                                 make_range_of_leaf_pieces(w, whole->first + half, whole->count - half)};
     memcpy(out, both, sizeof both);
 }
 
@@ -118,11 +118,12 @@ static int divide_range_among_children(const widening *w, const piece_range *who
     while (count < w->width) {
         int largest = -1;
         for (int i = 0; i < count; i++)
-            if (out[i].count > w->width && (largest < 0 || area_of(out[i].box) > area_of(out[largest].box)))
+            if (out[i].count > w->width &&
+                (largest < 0 || compute_half_box_area(out[i].box) > compute_half_box_area(out[largest].box)))
                 largest = i;
         if (largest < 0) break;
         piece_range halves[2];
-        divide(w, &out[largest], halves);
+        divide_piece_range(w, &out[largest], halves);
         out[largest] = halves[0];
         out[count++] = halves[1];
     }
@@ -189,7 +190,7 @@ static void count_used_bytes(const widening *w)
     base_set_used_bytes(w->out->sources, leaves * width * sizeof(int32_t));
 }
 
-static bool widen(widening *w)
+static bool build_wide_tree(widening *w)
 {
     const size_t nodes = (size_t)w->binary->node_count;
     w->first = base_alloc(nodes * sizeof *w->first);
@@ -209,7 +210,7 @@ static bool widen(widening *w)
     return is_well;
 }
 
-static insitu_status build_boxes(const widening *w, int threads, mmbvh *out, base_error *error)
+static insitu_status build_binary_tree(const widening *w, int threads, mmbvh *out, base_error *error)
 {
     const int64_t count = w->piece_count;
     const size_t bytes = (size_t)count * 3 * sizeof(float);
@@ -242,8 +243,8 @@ insitu_status occluder_tree_build(const occluder_piece *pieces, int64_t count, i
     mmbvh binary = {0};
     widening w = {.pieces = pieces, .piece_count = count, .rows = rows, .binary = &binary, .width = width, .out = out};
     if (!count) return INSITU_OK;
-    insitu_status status = build_boxes(&w, threads, &binary, error);
-    if (!status && !widen(&w))
+    insitu_status status = build_binary_tree(&w, threads, &binary, error);
+    if (!status && !build_wide_tree(&w))
         status =
             base_fail(error, INSITU_ERROR_MEMORY, "no memory for a tree of %lld pieces of surfaces", (long long)count);
     mmbvh_free(&binary);

@@ -47,7 +47,7 @@ typedef struct occluder_search {
 } occluder_search;
 
 /* Appends an item to a list and returns it; NULL if memory ran out. */
-static void *add(occluder_search *s, list *l, size_t size)
+static void *append_list_item(occluder_search *s, list *l, size_t size)
 {
     if (l->count == l->capacity) {
         const int64_t capacity = l->capacity + l->capacity / 2 + 256;
@@ -93,7 +93,8 @@ static void compute_vertex_bounds(const occluder_search *s, double low[3], doubl
 static bool add_vertex(occluder_search *s, const double world[3], double value)
 {
     const render_space *space = &s->frame->job->space;
-    double *place = add(s, &s->places, 3 * sizeof *place), *kept = add(s, &s->values, sizeof *kept);
+    double *place = append_list_item(s, &s->places, 3 * sizeof *place),
+           *kept = append_list_item(s, &s->values, sizeof *kept);
     if (!place || !kept) return false;
     for (int a = 0; a < 3; a++) place[a] = (world[a] - space->origin[a]) * space->scale;
     *kept = value;
@@ -114,7 +115,7 @@ static void cross_edge(const occluder_search *s, double isovalue, int i, int j, 
 
 static void add_triangle(occluder_search *s, float a[3], float b[3], float c[3])
 {
-    occluder_piece *t = add(s, &s->triangles, sizeof *t);
+    occluder_piece *t = append_list_item(s, &s->triangles, sizeof *t);
     if (!t) return;
     memcpy(t->rows, a, 3 * sizeof *a);
     memcpy(t->rows + 3, b, 3 * sizeof *b);
@@ -148,7 +149,7 @@ static void add_tet(occluder_search *s, double isovalue)
 /* ---- slabs, which contain the surface in other cells ------------------------------------------------------------- */
 
 /* Solves m x = b for a symmetric matrix m. x is 0 if m is nearly singular; then the slab is the whole cell. */
-static void solve(double m[3][3], const double b[3], double x[3])
+static void solve_symmetric_system(double m[3][3], const double b[3], double x[3])
 {
     double inverse[3][3];
     for (int i = 0; i < 3; i++)
@@ -183,24 +184,24 @@ static void fit_linear_function(const occluder_search *s, double isovalue, doubl
             for (int k = 0; k < 3; k++) m[a][k] += d[a] * d[k];
         }
     }
-    solve(m, b, gradient);
+    solve_symmetric_system(m, b, gradient);
     *level = value;
     for (int a = 0; a < 3; a++) *level -= gradient[a] * mean[a];
 }
 
 /* Returns the power of two by which the cell's values minus the isovalue are scaled to near 1. */
-static double scale_of(const occluder_search *s, double isovalue)
+static double compute_value_scale(const occluder_search *s, double isovalue)
 {
     double largest = 0;
     for (int i = 0; i < s->count; i++) largest = fmax(largest, fabs(value_of(s, i) - isovalue));
-    return kernel_mirrored_power(largest);
+    return kernel_compute_normalizing_power(largest);
 }
 
 /* Computes the numbers that are stored for the slab of the current cell (out->rows). */
 static void fill_slab(const occluder_search *s, double isovalue, occluder_piece *out)
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
-    const double scale = scale_of(s, isovalue);
+    const double scale = compute_value_scale(s, isovalue);
     compute_vertex_bounds(s, low, high);
     fit_linear_function(s, isovalue, scale, gradient, &level);
     for (int i = 0; i < s->count; i++) {
@@ -227,7 +228,7 @@ static void fill_slab(const occluder_search *s, double isovalue, occluder_piece 
 
 /* Stores in the hex's record which of its vertices are the corners of each face, in the form of
  * kernel_transformed_curved.corners. */
-static void fill_faces(const kernel_cell *c, float *record)
+static void store_face_corners(const kernel_cell *c, float *record)
 {
     for (int face = 0; face < 6; face++) {
         const signed char *loop = kernel_shapes[0].faces[face].vertices;
@@ -240,7 +241,7 @@ static void fill_faces(const kernel_cell *c, float *record)
 }
 
 /* Returns whether one of the hex's faces has collapsed to a triangle. */
-static bool collapses(const kernel_cell *c)
+static bool has_collapsed_face(const kernel_cell *c)
 {
     for (int face = 0; face < 6; face++) {
         int corner[4];
@@ -255,23 +256,23 @@ static bool collapses(const kernel_cell *c)
  * by one: if the job has clips, if a face of the hex has collapsed to a triangle, or if memory ran out. */
 static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue)
 {
-    const double scale = scale_of(s, isovalue);
-    if (s->frame->job->clip_count || collapses(c)) return -1;
-    float *record = add(s, &s->hexes, HEX_BYTES);
+    const double scale = compute_value_scale(s, isovalue);
+    if (s->frame->job->clip_count || has_collapsed_face(c)) return -1;
+    float *record = append_list_item(s, &s->hexes, HEX_BYTES);
     if (!record) return -1;
     for (int i = 0; i < 8; i++) {
         for (int a = 0; a < 3; a++) record[4 * i + a] = (float)place_of(s, i)[a];
         record[4 * i + 3] = (float)((value_of(s, i) - isovalue) * scale);
     }
-    fill_faces(c, record);
+    store_face_corners(c, record);
     return (int32_t)s->hexes.count - 1;
 }
 
 static void add_slab(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const int32_t record = kernel_is_box(c->type) ? add_hex(s, c, isovalue) : -1;
-    occluder_piece *out = add(s, &s->slabs, sizeof *out);
-    kernel_occluder *cell = add(s, &s->cells, sizeof *cell);
+    occluder_piece *out = append_list_item(s, &s->slabs, sizeof *out);
+    kernel_occluder *cell = append_list_item(s, &s->cells, sizeof *cell);
     if (!out || !cell) return;
     fill_slab(s, isovalue, out);
     out->surface = s->cell.surface;
@@ -284,8 +285,8 @@ static void add_slab(occluder_search *s, const kernel_cell *c, double isovalue)
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
 static bool list_cell_vertices(occluder_search *s, kernel_cell *c, const grid *g)
 {
-    for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    kernel_cell_order(c);
+    for (int i = 0; i < c->count; i++) grid_read_vertex_position(g, c->vertices[i], c->world[i]);
+    kernel_cell_sort_vertices(c);
     for (int i = 0; i < c->count; i++)
         if (!add_vertex(s, c->world[i], c->values[i])) return false;
     return true;
@@ -297,7 +298,7 @@ static bool list_polyhedron_vertices(occluder_search *s, const grid *g, const gr
     int64_t vertex;
     double world[3];
     while (grid_walk_next(&walk, &vertex)) {
-        grid_vertex(g, vertex, world);
+        grid_read_vertex_position(g, vertex, world);
         if (!add_vertex(s, world, grid_field_value(field, vertex))) return false;
     }
     return s->count > 0;
@@ -355,7 +356,7 @@ static void find_in_subtree(occluder_search *s, const kernel_subtree *subtree)
 }
 
 /* Moves the items of `from` to the end of `to`. Returns false if memory ran out. */
-static bool join(list *to, list *from, size_t size)
+static bool append_items_of_list(list *to, list *from, size_t size)
 {
     if (!to->items) {
         *to = *from;
@@ -371,14 +372,15 @@ static bool join(list *to, list *from, size_t size)
 }
 
 /* Moves all occluders of `from` to `to`, and adapts the indices of records. Returns false if memory ran out. */
-static bool join_lists(occluder_search *to, occluder_search *from)
+static bool append_occluders(occluder_search *to, occluder_search *from)
 {
     kernel_occluder *cells = from->cells.items;
     for (int64_t i = 0; i < from->cells.count; i++)
         if (cells[i].record >= 0) cells[i].record += (int32_t)to->hexes.count;
-    return !from->out_of_memory && join(&to->triangles, &from->triangles, sizeof(occluder_piece)) &&
-           join(&to->slabs, &from->slabs, sizeof(occluder_piece)) &&
-           join(&to->cells, &from->cells, sizeof(kernel_occluder)) && join(&to->hexes, &from->hexes, HEX_BYTES);
+    return !from->out_of_memory && append_items_of_list(&to->triangles, &from->triangles, sizeof(occluder_piece)) &&
+           append_items_of_list(&to->slabs, &from->slabs, sizeof(occluder_piece)) &&
+           append_items_of_list(&to->cells, &from->cells, sizeof(kernel_occluder)) &&
+           append_items_of_list(&to->hexes, &from->hexes, HEX_BYTES);
 }
 
 static bool find_all_occluders(const kernel_frame *frame, int threads, occluder_search *out)
@@ -393,7 +395,7 @@ static bool find_all_occluders(const kernel_frame *frame, int threads, occluder_
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t i = 0; i < count; i++) find_in_subtree(&own, &subtrees[i]);
 #pragma omp critical(occluders)
-        is_well = join_lists(out, &own);
+        is_well = append_occluders(out, &own);
         free_lists(&own);
         region_leave();
     }

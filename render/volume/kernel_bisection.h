@@ -50,11 +50,11 @@
 #include "simd.h"
 
 /* Returns the rays for which the opacity has a step at a value from low to high. */
-SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
+SIMD_INLINE vm kernel_has_opacity_step_in_range(const kernel_pieces *t, vf low, vf high)
 {
     vm any = vm_none();
     for (int i = 0; i < t->step_count; i++) {
-        const vf cut = vf_set(kernel_rounded_step(t->steps[i]));
+        const vf cut = vf_set(kernel_round_opacity_step(t->steps[i]));
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -77,7 +77,7 @@ typedef struct kernel_exact_point {
 typedef struct kernel_bisection {
     const kernel_frame *frame;
     kernel_segments *list;
-    /* polynomial coefficients of the cell's map (3 rows) and of the field (kernel_exact_setup()) */
+    /* polynomial coefficients of the cell's map (3 rows) and of the field (kernel_exact_fit_cell_polynomials()) */
     const double (*map)[8];
     bool is_pyramid;
     /* constants of the ray: at depth t its x and y in tile space are (u, v) * (slope * t + depth_offset) */
@@ -95,19 +95,20 @@ static inline double kernel_interpolate(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* Computes the ray's point at depth t, as kernel_value_at() does, but in double. Newton's method finds the reference
- * coordinates, first from the initial guess `guess` and, if it does not converge, from a point near the cell's middle.
- * If both attempts fail, reference coordinates and field are interpolated between the ends of the interval. */
-static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
+/* Computes the ray's point at depth t, as kernel_evaluate_field_in_one_cell() does, but in double. Newton's method
+ * finds the reference coordinates, first from the initial guess `guess` and, if it does not converge, from a point near
+ * the cell's middle. If both attempts fail, reference coordinates and field are interpolated between the ends of the
+ * interval. */
+static kernel_exact_point kernel_find_exact_point_at_depth(const kernel_bisection *h, double t, const double guess[3])
 {
     kernel_exact_point out = {.t = t};
     const double reach = h->slope * t + h->depth_offset, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
     memcpy(out.r, guess, sizeof out.r);
-    if (!kernel_exact_newton(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_near(out.r)) {
+    if (!kernel_exact_invert_map(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_in_or_near_cell(out.r)) {
         out.r[0] = out.r[1] = 0.4;
         out.r[2] = 0.5;
-        if (!kernel_exact_newton(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_near(out.r)) {
+        if (!kernel_exact_invert_map(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_in_or_near_cell(out.r)) {
             const double share = (t - h->in.t) / (h->out.t - h->in.t);
             for (int a = 0; a < 3; a++) out.r[a] = kernel_interpolate(h->in.r[a], h->out.r[a], share);
             out.v = kernel_interpolate(h->in.v, h->out.v, share);
@@ -115,31 +116,32 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
             return out;
         }
     }
-    out.v = kernel_exact_value(h->map[3], out.r, kernel_exact_product(h->is_pyramid, out.r, slopes));
+    out.v = kernel_exact_evaluate_polynomial(h->map[3], out.r,
+                                             kernel_exact_compute_product_term(h->is_pyramid, out.r, slopes));
     return out;
 }
 
 /* Returns the ray's point at the depth a->t + share * (b->t - a->t), between the points a and b. */
-static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
-                                                     const kernel_exact_point *b, double share)
+static kernel_exact_point kernel_find_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
+                                                          const kernel_exact_point *b, double share)
 {
     double guess[3];
     for (int n = 0; n < 3; n++) guess[n] = kernel_interpolate(a->r[n], b->r[n], share);
-    return kernel_exact_point_at(h, kernel_interpolate(a->t, b->t, share), guess);
+    return kernel_find_exact_point_at_depth(h, kernel_interpolate(a->t, b->t, share), guess);
 }
 
 /* Returns the ray's point between a and b at which the field is x. The values at a and b must lie on different sides of
  * x. The search is regula falsi in the Illinois variant (it halves the value at an end that is kept), with a bisection
  * in every third step. */
-static kernel_exact_point kernel_exact_point_of_value(const kernel_bisection *h, const kernel_exact_point *a,
-                                                      const kernel_exact_point *b, double x)
+static kernel_exact_point kernel_find_exact_point_of_value(const kernel_bisection *h, const kernel_exact_point *a,
+                                                           const kernel_exact_point *b, double x)
 {
     kernel_exact_point low = *a, high = *b, at = *a;
     double low_v = low.v - x, high_v = high.v - x;
     const double enough = 1e-15 * fmax(1, fabs(x));
     for (int n = 0; n < 60; n++) {
         const double share = n % 3 == 2 ? 0.5 : low_v / (low_v - high_v);
-        at = kernel_exact_point_between(h, &low, &high, share);
+        at = kernel_find_exact_point_between(h, &low, &high, share);
         const double v = at.v - x;
         if (fabs(v) <= enough || high.t - low.t <= 1e-16 * fabs(at.t)) break;
         if ((v < 0) == (low_v < 0)) {
@@ -169,7 +171,7 @@ static inline double kernel_piece_high(const kernel_real *p)
 }
 
 /* Returns bounds of the transfer function over the values from low to high. */
-static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, double high)
+static kernel_bound kernel_bound_transfer_over_values(const kernel_pieces *t, double low, double high)
 {
     const double last = KERNEL_PIECE_BINS - 1;
     kernel_bound out = {.extinction_low = 1e30f};
@@ -196,8 +198,8 @@ typedef struct kernel_subinterval {
 
 /* Computes the deviation of the field from its chord on a subinterval, and the range of its values. from: begin of the
  * subinterval; first, third: its points at one and three quarters. */
-static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_subinterval *sub,
-                                      const kernel_exact_point *first, const kernel_exact_point *third)
+static void kernel_measure_subinterval_deviation(const kernel_exact_point *from, kernel_subinterval *sub,
+                                                 const kernel_exact_point *first, const kernel_exact_point *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
     sub->low = fmin(a, b);
@@ -213,8 +215,8 @@ static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_sub
 /* Returns an upper bound of the error of light if the subinterval becomes one segment. s: bounds of the transfer
  * function over its values; length: its length in unit distances; *all: becomes an upper bound of the error that holds
  * for any deviation of the field from its chord. */
-static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
-                                       double length, double *all)
+static double kernel_bound_subinterval_error(const kernel_bisection *h, const kernel_subinterval *sub,
+                                             const kernel_bound *s, double length, double *all)
 {
     const double least = (double)s->extinction_low, most = (double)s->extinction_high;
     const double contrast = (double)h->list->pieces->contrast, colour_slope = (double)s->colour_slope;
@@ -229,7 +231,7 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* ---- steps ---- */
 
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
-static const double *kernel_step_between(const kernel_bisection *h, double low, double high)
+static const double *kernel_find_opacity_step_between(const kernel_bisection *h, double low, double high)
 {
     const double *steps = h->list->pieces->steps;
     for (int i = 0; i < h->list->pieces->step_count; i++)
@@ -244,10 +246,10 @@ static void kernel_range_between_steps(const kernel_bisection *h, double inside,
     const double *steps = h->list->pieces->steps;
     int n = 0;
     side[0] = -3e38f, side[1] = 3e38f;
-    for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_rounded_step(steps[n]);
+    for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_round_opacity_step(steps[n]);
     /* a segment whose values all equal a step's value counts as above the step; so the range ends at the float32 just
      * below the step, and values below the step are never rounded up to the step */
-    if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_rounded_step(steps[n]), side[0]);
+    if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_round_opacity_step(steps[n]), side[0]);
 }
 
 /* Rounds x to float32 and clamps it to `side`, the range between two neighbouring steps; *rest: the rounding error,
@@ -261,25 +263,25 @@ static void kernel_step_round(const float side[2], double x, float *v, double *r
 
 /* Returns bounds of the transfer function over the values of the subinterval. step: a step of the opacity among these
  * values, or NULL. */
-static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const kernel_subinterval *sub,
-                                             const double *step)
+static kernel_bound kernel_bound_transfer_on_subinterval(const kernel_bisection *h, const kernel_subinterval *sub,
+                                                         const double *step)
 {
     float side[2];
     kernel_range_between_steps(h, sub->middle.v, side);
     if (step)
-        return kernel_bound_of_values(h->list->pieces,
-                                      fmin(sub->low, (double)nextafterf(kernel_rounded_step(*step), -3e38f)),
-                                      fmax(sub->high, (double)nextafterf(kernel_rounded_step(*step), 3e38f)));
+        return kernel_bound_transfer_over_values(
+            h->list->pieces, fmin(sub->low, (double)nextafterf(kernel_round_opacity_step(*step), -3e38f)),
+            fmax(sub->high, (double)nextafterf(kernel_round_opacity_step(*step), 3e38f)));
     const double low = fmin(fmax(sub->low, (double)side[0]), (double)side[1]);
     const double high = fmin(fmax(sub->high, (double)side[0]), (double)side[1]);
-    return kernel_bound_of_values(h->list->pieces, low, high);
+    return kernel_bound_transfer_over_values(h->list->pieces, low, high);
 }
 
 /* ---- segments ---- */
 
 /* Returns the same segment in all lanes. length: in unit distances. The values at the segment's ends are v[0] + rest[0]
  * and v[1] + rest[1]. */
-static kernel_unit_segment kernel_exact_segment(double length, const float v[2], const double rest[2])
+static kernel_unit_segment kernel_broadcast_segment(double length, const float v[2], const double rest[2])
 {
     return (kernel_unit_segment){vf_set((float)length), vf_set(v[0]), vf_set(v[1]), vf_set((float)rest[0]),
                                  vf_set((float)rest[1])};
@@ -291,14 +293,14 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
 static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {
-    const bool is_cut = kernel_step_between(h, sub->low, sub->high) != NULL;
+    const bool is_cut = kernel_find_opacity_step_between(h, sub->low, sub->high) != NULL;
     const double x[2] = {from->v, sub->end.v}, length = (sub->end.t - from->t) * h->per_t;
     double rest[2] = {0, 0};
     float v[2] = {(float)x[0], (float)x[1]}, side[2];
     kernel_range_between_steps(h, sub->middle.v, side);
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(side, x[i], &v[i], &rest[i]);
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
-    const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
+    const kernel_unit_segment run = kernel_broadcast_segment(length, v, rest);
     if (h->list->is_double || t0 < t1)
         kernel_segments_add(h->list, false, h->list->is_double, vi_set(lane), vm_from_bits(1u << lane), vf_set(t0),
                             vf_set(t1), &run);
@@ -308,13 +310,13 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, int lane, 
 
 /* Returns whether the error of light is small enough if the subinterval becomes one segment. is_cut: a step of the
  * opacity lies among its values; length: in unit distances. */
-static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
-                                       double length, bool is_cut)
+static bool kernel_is_subinterval_accurate(const kernel_bisection *h, const kernel_subinterval *sub,
+                                           const kernel_bound *s, double length, bool is_cut)
 {
     const double reach = (double)h->frame->reach[h->list->volume], a = (double)h->frame->allowance;
     const double depth = (double)s->extinction_low * length;
     double all;
-    const double error = kernel_subinterval_error(h, sub, s, length, &all);
+    const double error = kernel_bound_subinterval_error(h, sub, s, length, &all);
     if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
     return (is_cut || !sub->is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
@@ -329,15 +331,15 @@ static void kernel_subinterval_bisect(kernel_bisection *h, int lane, kernel_exac
     stack[0] = whole;
     while (count > 0 && (float)from.t < list->t_end[lane]) {
         kernel_subinterval sub = stack[--count];
-        const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
-        const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
-        kernel_subinterval_sample(&from, &sub, &first, &third);
-        const double *step = kernel_step_between(h, sub.low, sub.high);
-        const kernel_bound s = kernel_subinterval_bound(h, &sub, step);
+        const kernel_exact_point first = kernel_find_exact_point_between(h, &from, &sub.middle, 0.5);
+        const kernel_exact_point third = kernel_find_exact_point_between(h, &sub.middle, &sub.end, 0.5);
+        kernel_measure_subinterval_deviation(&from, &sub, &first, &third);
+        const double *step = kernel_find_opacity_step_between(h, sub.low, sub.high);
+        const kernel_bound s = kernel_bound_transfer_on_subinterval(h, &sub, step);
         const double length = (sub.end.t - from.t) * h->per_t;
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
-        if (is_last || kernel_subinterval_is_good(h, &sub, &s, length, step != NULL)) {
+        if (is_last || kernel_is_subinterval_accurate(h, &sub, &s, length, step != NULL)) {
             if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segment(h, lane, &from, &sub);
             const double depth = (double)s.extinction_low * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
@@ -348,9 +350,9 @@ static void kernel_subinterval_bisect(kernel_bisection *h, int lane, kernel_exac
         kernel_subinterval near = {.end = sub.middle, .middle = first, sub.depth + 1, sub.is_monotone};
         kernel_subinterval far = {.end = sub.end, .middle = third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
-            near.end = kernel_exact_point_of_value(h, &from, &sub.end, *step);
-            near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
-            far.middle = kernel_exact_point_between(h, &near.end, &far.end, 0.5);
+            near.end = kernel_find_exact_point_of_value(h, &from, &sub.end, *step);
+            near.middle = kernel_find_exact_point_between(h, &from, &near.end, 0.5);
+            far.middle = kernel_find_exact_point_between(h, &near.end, &far.end, 0.5);
         }
         stack[count++] = far;
         stack[count++] = near;
@@ -367,8 +369,8 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
     const bool is_flat = f->job->camera.is_orthographic;
     double map[4][8];
     double u[SIMD_WIDTH], v[SIMD_WIDTH];
-    kernel_double_rays_of(p, u, v);
-    kernel_exact_setup(map, p, c, &f->volumes[list->volume]);
+    kernel_get_ray_parameters_in_double(p, u, v);
+    kernel_exact_fit_cell_polynomials(map, p, c, &f->volumes[list->volume]);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_bisection h = {.frame = f,
@@ -392,12 +394,12 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
-        const kernel_exact_point from = kernel_exact_point_between(&h, &h.in, &h.out, a);
-        kernel_subinterval sub = {.end = kernel_exact_point_between(&h, &h.in, &h.out, b)};
+        const kernel_exact_point from = kernel_find_exact_point_between(&h, &h.in, &h.out, a);
+        kernel_subinterval sub = {.end = kernel_find_exact_point_between(&h, &h.in, &h.out, b)};
         kernel_exact_point begin = from;
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
-        sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
+        sub.middle = kernel_find_exact_point_between(&h, &from, &sub.end, 0.5);
         kernel_subinterval_bisect(&h, n, begin, sub);
     }
 }

@@ -24,7 +24,7 @@ static inline double kernel_piece_opacity(const kernel_real *p, double x)
 
 /* Computes the minimum (out[0]) and the maximum (out[1]) of the extinction's absolute slope between two values of a
  * piece, per unit of the transfer function's domain. */
-static inline void kernel_piece_steepness(const kernel_real *p, double from, double to, double out[2])
+static inline void kernel_bound_piece_extinction_slope(const kernel_real *p, double from, double to, double out[2])
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to), most = fmax(a0, a1);
     const double steepness = fabs((double)p[KERNEL_PIECE_SLOPE]);
@@ -37,7 +37,7 @@ static inline void kernel_bound_widen(kernel_bound *b, const kernel_real *p, dou
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to);
     double steepness[2];
-    kernel_piece_steepness(p, from, to, steepness);
+    kernel_bound_piece_extinction_slope(p, from, to, steepness);
     b->extinction_low = fminf(b->extinction_low, (float)kernel_extinction_of(fmin(a0, a1)));
     b->extinction_high = fmaxf(b->extinction_high, (float)kernel_extinction_of(fmax(a0, a1)));
     b->extinction_slope = fmaxf(b->extinction_slope, (float)steepness[1]);

@@ -69,9 +69,9 @@ enum {
 typedef kernel_f64 kernel_double_face[KERNEL_DOUBLE_NUMBERS][2];
 
 /* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
-SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, double u[SIMD_WIDTH], double v[SIMD_WIDTH])
+SIMD_INLINE void kernel_get_ray_parameters_in_double(const kernel_packet *p, double u[SIMD_WIDTH], double v[SIMD_WIDTH])
 {
-    kernel_packet_ray_parameters(p, u, v);
+    kernel_packet_compute_pixel_slopes(p, u, v);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         u[i] -= p->tile->centre_x;
         v[i] -= p->tile->centre_y;
@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, double u[SIMD_WID
 }
 
 /* Maps a value of the field to the transfer function's domain, clamped to [-1e18, 1e18]. */
-static inline double kernel_double_domain(const kernel_transfer *transfer, double value)
+static inline double kernel_map_to_domain_in_double(const kernel_transfer *transfer, double value)
 {
     return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
 }
@@ -94,8 +94,8 @@ typedef struct kernel_double_vertices {
 } kernel_double_vertices;
 
 /* Computes the three coefficients of the edge function from a to b (kernel_cell.h). */
-SIMD_INLINE void kernel_double_edge(const kernel_double_vertices *a, const kernel_double_vertices *b,
-                                    kernel_f64 edge[3])
+SIMD_INLINE void kernel_compute_edge_function_in_double(const kernel_double_vertices *a,
+                                                        const kernel_double_vertices *b, kernel_f64 edge[3])
 {
     edge[0] = a->at[0] * b->at[1] - b->at[0] * a->at[1];
     edge[1] = b->depth * a->at[1] - a->depth * b->at[1];
@@ -104,8 +104,9 @@ SIMD_INLINE void kernel_double_edge(const kernel_double_vertices *a, const kerne
 
 /* Computes the numbers of one face, for one half of the lanes, from the tets' vertices and edge functions. face: a row
  * of kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
-SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots, const kernel_f64 (*edges)[3],
-                                            const signed char *face, double radius, int half, kernel_double_face out)
+SIMD_INLINE void kernel_double_compute_face_functions(const kernel_double_vertices *spots, const kernel_f64 (*edges)[3],
+                                                      const signed char *face, double radius, int half,
+                                                      kernel_double_face out)
 {
     const kernel_double_vertices *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
     const kernel_f64 *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
@@ -121,10 +122,9 @@ SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertices *spots,
 }
 
 /* Computes the numbers (kernel_double_face) of the four faces of each of the transformed tets. */
-static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_frame *f, const kernel_tile *tile,
-                                                                  const kernel_transformed_tets *tets,
-                                                                  const kernel_transfer *transfer,
-                                                                  kernel_double_face out[4])
+static __attribute__((noinline)) void
+kernel_double_compute_tet_functions(const kernel_frame *f, const kernel_tile *tile, const kernel_transformed_tets *tets,
+                                    const kernel_transfer *transfer, kernel_double_face out[4])
 {
     for (int half = 0; half < 2; half++) {
         kernel_double_vertices spots[4];
@@ -135,10 +135,11 @@ static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_f
             spots[i].value = kernel_f64_clamp(value, 1e18);
         }
         for (int n = 0; n < KERNEL_TET_EDGES; n++)
-            kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
+            kernel_compute_edge_function_in_double(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]],
+                                                   edges[n]);
         for (int n = 0; n < 4; n++)
-            kernel_double_compute_face(spots, (const kernel_f64(*)[3])edges, kernel_tet_face[n], (double)tile->radius,
-                                       half, out[n]);
+            kernel_double_compute_face_functions(spots, (const kernel_f64(*)[3])edges, kernel_tet_face[n],
+                                                 (double)tile->radius, half, out[n]);
     }
 }
 
@@ -154,8 +155,8 @@ typedef struct kernel_double_points {
 /* Returns the value on the ray (u, v) of one of the affine functions of the face that each ray crosses, for one half of
  * the lanes. function: KERNEL_DOUBLE_DEPTH, KERNEL_DOUBLE_VALUE or KERNEL_DOUBLE_WEIGHT; index: index, in floats, of
  * the face's first number in `faces`. */
-SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_face *faces, int function, vi index, int half,
-                                            kernel_f64 u, kernel_f64 v)
+SIMD_INLINE kernel_f64 kernel_double_evaluate_face_function(const kernel_double_face *faces, int function, vi index,
+                                                            int half, kernel_f64 u, kernel_f64 v)
 {
     kernel_f64 c[3];
     for (int n = 0; n < 3; n++) c[n] = vd_gather((const float *)(const void *)faces[0][function + n], index, half);
@@ -164,16 +165,20 @@ SIMD_INLINE kernel_f64 kernel_double_affine(const kernel_double_face *faces, int
 
 /* Computes the points at which rays meet the planes of faces of their tets. face: index of each ray's face in its tet;
  * lane: lane of each ray's tet. */
-SIMD_INLINE void kernel_double_compute_points(const kernel_double_face *faces, vi face, vi lane, const kernel_f64 u[2],
-                                              const kernel_f64 v[2], kernel_double_points *out)
+SIMD_INLINE void kernel_double_intersect_face_planes(const kernel_double_face *faces, vi face, vi lane,
+                                                     const kernel_f64 u[2], const kernel_f64 v[2],
+                                                     kernel_double_points *out)
 {
     const vi index = face * (2 * SIMD_WIDTH * KERNEL_DOUBLE_NUMBERS) + 2 * lane;
     kernel_f64 weight[2], least[2];
     for (int half = 0; half < 2; half++) {
-        const kernel_f64 w = kernel_double_affine(faces, KERNEL_DOUBLE_WEIGHT, index, half, u[half], v[half]);
+        const kernel_f64 w =
+            kernel_double_evaluate_face_function(faces, KERNEL_DOUBLE_WEIGHT, index, half, u[half], v[half]);
         const kernel_f64 inverse = 1.0 / w;
-        out->t[half] = kernel_double_affine(faces, KERNEL_DOUBLE_DEPTH, index, half, u[half], v[half]) * inverse;
-        out->value[half] = kernel_double_affine(faces, KERNEL_DOUBLE_VALUE, index, half, u[half], v[half]) * inverse;
+        out->t[half] =
+            kernel_double_evaluate_face_function(faces, KERNEL_DOUBLE_DEPTH, index, half, u[half], v[half]) * inverse;
+        out->value[half] =
+            kernel_double_evaluate_face_function(faces, KERNEL_DOUBLE_VALUE, index, half, u[half], v[half]) * inverse;
         weight[half] = w * w;
         least[half] = vd_gather((const float *)(const void *)faces[0][KERNEL_DOUBLE_LEAST], index, half);
         least[half] *= least[half];
@@ -193,14 +198,15 @@ SIMD_INLINE void kernel_round_doubles(const kernel_f64 value[2], vf *v, vf *rest
 /* Replaces the length and the values of *run, the rays' segments in tets in float32, by those computed in double. Rays
  * that see one of the two crossed faces edge on keep those in float32. The length is in units of t. lane: lane of each
  * ray's tet; first, second: indices of the crossed faces in the tet; u, v: parameters of the rays. */
-SIMD_INLINE void kernel_double_segments(const kernel_double_face *faces, vi lane, vi first, vi second,
-                                        const kernel_f64 u[2], const kernel_f64 v[2], kernel_unit_segment *run)
+SIMD_INLINE void kernel_refine_segments_in_double(const kernel_double_face *faces, vi lane, vi first, vi second,
+                                                  const kernel_f64 u[2], const kernel_f64 v[2],
+                                                  kernel_unit_segment *run)
 {
     kernel_double_points a, b;
     kernel_f64 ends[2][2], length[2];
     vf rounded[2], rest[2];
-    kernel_double_compute_points(faces, first, lane, u, v, &a);
-    kernel_double_compute_points(faces, second, lane, u, v, &b);
+    kernel_double_intersect_face_planes(faces, first, lane, u, v, &a);
+    kernel_double_intersect_face_planes(faces, second, lane, u, v, &b);
     const vm sound = vm_and(a.sound, b.sound), swap = vd_lt(b.t, a.t);
     vd_select(swap, b.value, a.value, ends[0]);
     vd_select(swap, a.value, b.value, ends[1]);
@@ -219,22 +225,22 @@ enum { KERNEL_EXACT_STEPS = 24 };
 
 /* Computes the polynomial coefficients (kernel_map.h) of the map of a hex, wedge or pyramid to tile space (3 rows), and
  * of the field in the transfer function's domain (last row). */
-static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const kernel_cell *c,
-                               const kernel_transfer *transfer)
+static void kernel_exact_fit_cell_polynomials(double map[4][8], const kernel_packet *p, const kernel_cell *c,
+                                              const kernel_transfer *transfer)
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
         double place[3];
         kernel_transform_in_double(p->frame, p->tile, c->world[i], place);
         for (int a = 0; a < 3; a++) d[a][i] = place[a];
-        d[3][i] = kernel_double_domain(transfer, c->values[i]);
+        d[3][i] = kernel_map_to_domain_in_double(transfer, c->values[i]);
     }
     for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);
 }
 
 /* Returns the product term m of a cell's map (kernel_map.h) at the reference coordinates r: r[0] r[1] or, in a pyramid,
  * r[0] r[1] / r[2]. Also computes the derivatives of m by r (slopes). */
-static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
+static inline double kernel_exact_compute_product_term(bool is_pyramid, const double r[3], double slopes[3])
 {
     slopes[0] = r[1];
     slopes[1] = r[0];
@@ -248,16 +254,16 @@ static inline double kernel_exact_product(bool is_pyramid, const double r[3], do
 }
 
 /* Returns the polynomial with the coefficients c at the reference coordinates r; m: its product term. */
-static inline double kernel_exact_value(const double c[8], const double r[3], double m)
+static inline double kernel_exact_evaluate_polynomial(const double c[8], const double r[3], double m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
 /* Computes the derivatives, by the reference coordinates r, of the polynomial with the coefficients c. m, slopes:
- * results of kernel_exact_product(). */
-static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
-                                         double out[3])
+ * results of kernel_exact_compute_product_term(). */
+static inline void kernel_exact_compute_gradient(const double c[8], const double r[3], double m, const double slopes[3],
+                                                 double out[3])
 {
     const double of_m = c[4] + r[2] * c[7];
     out[0] = c[1] + r[2] * c[5] + slopes[0] * of_m;
@@ -268,14 +274,14 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
 /* Finds the reference coordinates r of the point `target` in tile space by Newton's method in double, from an initial
  * guess in r. A step below 1e-8 is the last one; the error is then below rounding. Returns false if the method does not
  * converge. */
-static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const double target[3], double r[3])
+static bool kernel_exact_invert_map(const double (*map)[8], bool is_pyramid, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
         double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
-        const double m = kernel_exact_product(is_pyramid, r, slopes);
+        const double m = kernel_exact_compute_product_term(is_pyramid, r, slopes);
         for (int a = 0; a < 3; a++) {
-            off[a] = target[a] - kernel_exact_value(map[a], r, m);
-            kernel_exact_gradient(map[a], r, m, slopes, row[a]);
+            off[a] = target[a] - kernel_exact_evaluate_polynomial(map[a], r, m);
+            kernel_exact_compute_gradient(map[a], r, m, slopes, row[a]);
         }
         for (int a = 0; a < 3; a++) {
             const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];
@@ -294,7 +300,7 @@ static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const d
 }
 
 /* Returns whether r is in the reference domain [0, 1], or outside by at most KERNEL_MAP_BEYOND. */
-static inline bool kernel_exact_is_near(const double r[3])
+static inline bool kernel_exact_is_in_or_near_cell(const double r[3])
 {
     bool near = true;
     for (int a = 0; a < 3; a++)

@@ -66,7 +66,8 @@ SIMD_INLINE vf kernel_exp(vf x)
 
 /* Reads upper bounds of the effect of a field error on light, over the values from low to high of each lane
  * (KERNEL_LIGHT_VARIATION etc., kernel_types.h). */
-SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf out[KERNEL_LIGHT_ENTRIES])
+SIMD_INLINE void kernel_look_up_light_error_bounds(const kernel_pieces *t, vf low, vf high,
+                                                   vf out[KERNEL_LIGHT_ENTRIES])
 {
     const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
@@ -136,7 +137,7 @@ SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm 
 }
 
 /* Returns an entry (KERNEL_PIECE_OPACITY etc.) of each ray's piece. */
-SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
+SIMD_INLINE vf kernel_gather_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
 {
     if (place->common) return vf_set(place->common[entry]);
     return vf_gather(t->pieces[0] + entry, place->at * KERNEL_PIECE_ENTRIES);
@@ -146,12 +147,12 @@ SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_ind
  * errors of these values. */
 SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_index *at)
 {
-    at->low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW);
-    at->high = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH);
+    at->low = kernel_gather_piece_entry(t, at, KERNEL_PIECE_LOW);
+    at->high = kernel_gather_piece_entry(t, at, KERNEL_PIECE_HIGH);
     at->low_rest = at->high_rest = vf_set(0);
     if (__builtin_expect(t->has_rests, 0)) {
-        at->low_rest = kernel_piece_entry(t, at, KERNEL_PIECE_LOW_REST);
-        at->high_rest = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH_REST);
+        at->low_rest = kernel_gather_piece_entry(t, at, KERNEL_PIECE_LOW_REST);
+        at->high_rest = kernel_gather_piece_entry(t, at, KERNEL_PIECE_HIGH_REST);
     }
 }
 
@@ -246,19 +247,19 @@ SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *s, vf in
 }
 
 /* Computes opacity and 1 - opacity at the begin of a step, and the change of the opacity up to the end of the piece. */
-SIMD_INLINE void kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
-                                               kernel_piece_state *s)
+SIMD_INLINE void kernel_compute_step_begin_opacity(const kernel_pieces *t, const kernel_piece_index *at,
+                                                   kernel_piece_state *s)
 {
-    const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
-    s->opacity = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
-                                                kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    s->clear = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
-                                              kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    s->rise = s->sign * s->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+    const vf inverse = kernel_gather_piece_entry(t, at, KERNEL_PIECE_INVERSE);
+    s->opacity = kernel_piece_state_interpolate(s, inverse, kernel_gather_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+                                                kernel_gather_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
+    s->clear = kernel_piece_state_interpolate(s, inverse, kernel_gather_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+                                              kernel_gather_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
+    s->rise = s->sign * s->remaining * kernel_gather_piece_entry(t, at, KERNEL_PIECE_SLOPE);
 }
 
 /* Chooses the length of the step by the limits that are derived at the top of this file. */
-SIMD_INLINE void kernel_integration_step_limit(kernel_piece_state *s)
+SIMD_INLINE void kernel_choose_integration_step_length(kernel_piece_state *s)
 {
     const vf left = s->remaining_length, zero = vf_set(0), one = vf_set(1), rise = vf_abs(s->rise),
              ratio = s->clear * KERNEL_STEP_RATIO;
@@ -280,7 +281,7 @@ SIMD_INLINE void kernel_integration_step_limit(kernel_piece_state *s)
 
 /* Integrates a step: *e0 receives the integral of the extinction times the transmittance from the step's begin, and *e1
  * the same integral with the position on the step, from 0 to 1, as a factor. Returns the step's optical depth. */
-SIMD_INLINE vf kernel_integration_step_sum(const kernel_piece_state *s, vf *e0, vf *e1)
+SIMD_INLINE vf kernel_integrate_step(const kernel_piece_state *s, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
     const vf rise = s->rise * s->share, zero = vf_set(0), one = vf_set(1);
@@ -302,15 +303,15 @@ SIMD_INLINE vf kernel_integration_step_sum(const kernel_piece_state *s, vf *e0, 
 }
 
 /* Adds the light of one step, over which the value changes by `move`, to *light, on the rays in `open`. */
-SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf move,
-                                   const kernel_piece_state *s, kernel_light *light)
+SIMD_INLINE void kernel_add_light_of_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf move,
+                                          const kernel_piece_state *s, kernel_light *light)
 {
     vf e0, e1;
-    const vf depth = kernel_integration_step_sum(s, &e0, &e1);
+    const vf depth = kernel_integrate_step(s, &e0, &e1);
     const vf whole = light->transmittance * e0, moment = light->transmittance * e1 * move;
     for (int a = 0; a < 3; a++) {
-        const vf slope = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
-        const vf colour = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR + a) + s->below * slope;
+        const vf slope = kernel_gather_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
+        const vf colour = kernel_gather_piece_entry(t, at, KERNEL_PIECE_COLOUR + a) + s->below * slope;
         const vf sum = light->colour[a] + (whole * colour + moment * slope);
         light->colour[a] = vf_select(open, sum, light->colour[a]);
     }
@@ -319,8 +320,8 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_in
 }
 
 /* Integrates the segment, and adds its light to *light, behind the light already there. */
-static __attribute__((noinline)) void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run,
-                                                       kernel_light *light)
+static __attribute__((noinline)) void kernel_integrate_segments(const kernel_pieces *t, vm rays,
+                                                                const kernel_unit_segment *run, kernel_light *light)
 {
     kernel_piece_state s = kernel_piece_state_begin(run);
     vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, s.falling);
@@ -331,10 +332,10 @@ static __attribute__((noinline)) void kernel_integrate(const kernel_pieces *t, v
             kernel_piece_read_ends(t, &at);
             kernel_piece_state_enter(&s, run, fresh, &at);
         }
-        kernel_integration_step_begin(t, &at, &s);
-        kernel_integration_step_limit(&s);
+        kernel_compute_step_begin_opacity(t, &at, &s);
+        kernel_choose_integration_step_length(&s);
         const vf size = s.remaining * s.share, move = s.sign * size;
-        kernel_light_step(t, &at, open, move, &s, light);
+        kernel_add_light_of_step(t, &at, open, move, &s, light);
         s.below += move;
         s.above -= move;
         s.remaining -= size;

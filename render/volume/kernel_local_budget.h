@@ -9,8 +9,9 @@
  * the polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
  * oscillation (maximum minus minimum) of T g, times the integral of |v - f|. Over a range of values |g| is at most
  * `cost`, and for a fixed b, g varies by at most `swing` (error_variation in the code). g is linear in b, so both
- * follow from the minimum and the maximum of b (kernel_light_bounds()). Let D be the segment's optical depth and R the
- * colours' contrast. Along the segment T falls by at most min(D, 1), and b changes by at most R min(D, 1):
+ * follow from the minimum and the maximum of b (kernel_look_up_light_error_bounds()). Let D be the segment's optical
+ * depth and R the colours' contrast. Along the segment T falls by at most min(D, 1), and b changes by at most R min(D,
+ * 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
@@ -78,21 +79,22 @@ enum { KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
  * error_variation, weight_change, extinction and tolerance of *out. `sensitivity` and `residual_limit` must be set.
  * values: the field at the cells' vertices, by vertex and lane. The bounds must also hold at the ends of segments,
  * which may lie outside of the vertices' values. If there is one segment, its ends exceed them by at most 3/16 of the
- * values' range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the quadratic
- * part's maximum, which is less than that. */
-SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
-                                         kernel_local_bounds *out)
+ * values' range (kernel_local_exceeds_bounded_values()). If there are several, their ends exceed them by a sixth of the
+ * quadratic part's maximum, which is less than that. */
+SIMD_INLINE void kernel_local_set_light_error_bounds(const kernel_frame *f, int volume,
+                                                     const float (*values)[SIMD_WIDTH], int type,
+                                                     kernel_local_bounds *out)
 {
     const kernel_pieces *t = &f->pieces[volume];
     vf low = vf_load(values[0]), high = low, light[KERNEL_LIGHT_ENTRIES];
-    for (int i = 1; i < grid_type_vertices(type); i++) {
+    for (int i = 1; i < grid_type_vertex_count(type); i++) {
         low = vf_min(vf_load(values[i]), low);
         high = vf_max(vf_load(values[i]), high);
     }
     const vf margin = 0.1875f * (high - low);
     low -= margin;
     high += margin;
-    kernel_light_bounds(t, low, high, light);
+    kernel_look_up_light_error_bounds(t, low, high, light);
     const vf cost = light[KERNEL_LIGHT_COST];
     vf_store(out->cost, cost);
     vf_store(out->error_variation, light[KERNEL_LIGHT_VARIATION]);
@@ -113,25 +115,25 @@ SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, cons
  * polynomial's mean in a test of 200,000 hexes, wedges and pyramids whose vertices were moved by up to 0.55 edges along
  * each axis, so that some were nearly folded. The test used fields whose three sampled deviations give E = 0, or are
  * all 0. */
-SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
-                                            kernel_local_bounds *out)
+SIMD_INLINE void kernel_local_set_bounds_of_single_cell(const kernel_frame *f, int volume, const kernel_cell *c,
+                                                        kernel_local_bounds *out)
 {
     const float bend = 3;
     float values[8][SIMD_WIDTH];
     for (int i = 0; i < c->count; i++) vf_store(values[i], vf_set(c->f[i]));
     vf_store(out->sensitivity, vf_set(0));
     vf_store(out->residual_limit, vf_set(0));
-    kernel_local_set_bounds(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
+    kernel_local_set_light_error_bounds(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
     vf_store(out->bend, vf_set(bend));
     vf_store(out->unsampled,
-             bend * kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
+             bend * kernel_local_get_unsampled_factor(c->type) * (vf_load(out->high) - vf_load(out->low)));
 }
 
 /* ---- rays in cells ---- */
 
 /* Returns by how much a segment that replaces the whole interval must be raised above the field's chord, so that its
  * mean equals the mean of the fitted polynomial. */
-SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
+SIMD_INLINE vf kernel_local_compute_segment_offset(const kernel_local_pairs *p)
 {
     const vf *d = p->field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
@@ -139,9 +141,9 @@ SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 
 /* Returns the rays whose interval must not become a single segment: the values at its raised ends are outside of the
  * range of values for which the error bounds hold (kernel_local_bounds.low and high). */
-SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_exceeds_bounded_values(const kernel_local_bounds *b, const kernel_local_pairs *p)
 {
-    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
+    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_compute_segment_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
     return vm_or(vf_lt(low, kernel_gather_lane(b->low, p->rays.lane)),
                  vf_lt(kernel_gather_lane(b->high, p->rays.lane), high));
@@ -156,8 +158,8 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const ker
 
 /* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of
  * the part of v - f (segment minus field) that has mean zero, plus the effect of the errors of the segment's mean. */
-SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
-                                                 vf error_variation, vf cost)
+SIMD_INLINE vf kernel_local_bound_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
+                                                       vf error_variation, vf cost)
 {
     const vf half = vf_min(0.5f * (error_variation + weight_change), cost);
     return vf_muladd(half, mean, cost * (quartic + residual_error));
@@ -166,27 +168,28 @@ SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residua
 /* Computes *error_variation (`swing` at the top of this file) and *cost, the bounds of the effect of field errors on
  * light, over the range of values on the ray's own interval and at the ends of its segments. quartic: E. Returns the
  * rays on which the opacity has a step in this range. */
-SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
-                                      vf *error_variation, vf *cost)
+SIMD_INLINE vm kernel_local_bound_light_error_on_ray(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
+                                                     vf *error_variation, vf *cost)
 {
     const vf *d = p->field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
     const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
     const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
     const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
     vf light[KERNEL_LIGHT_ENTRIES];
-    kernel_light_bounds(t, low, high, light);
+    kernel_look_up_light_error_bounds(t, low, high, light);
     *error_variation = light[KERNEL_LIGHT_VARIATION];
     *cost = light[KERNEL_LIGHT_COST];
     const vf rounding = KERNEL_VALUE_ROUNDING * vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
-    return kernel_values_have_step(t, low - rounding, high + rounding);
+    return kernel_has_opacity_step_in_range(t, low - rounding, high + rounding);
 }
 
 /* Sets p->count, the number of segments of each ray, for an allowed error that grows with the absorption in the
  * interval. length: length of the interval, in unit distances; least: lower limit of p->count. Returns the rays for
  * which no number of segments is accurate enough. */
-static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_frame *f, int volume, vf mean, vf quartic,
-                                                                vf residual_error, vf weight_change, vf length,
-                                                                vf least, kernel_local_pairs *p)
+static __attribute__((noinline)) vm kernel_local_count_segments_by_depth(const kernel_frame *f, int volume, vf mean,
+                                                                         vf quartic, vf residual_error,
+                                                                         vf weight_change, vf length, vf least,
+                                                                         kernel_local_pairs *p)
 {
     const kernel_transfer *transfer = &f->volumes[volume];
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
@@ -195,12 +198,12 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_fra
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->field[i];
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
-    const vm has_step = kernel_local_ray_bound(&f->pieces[volume], p, quartic, &error_variation, &cost);
+    const vm has_step = kernel_local_bound_light_error_on_ray(&f->pieces[volume], p, quartic, &error_variation, &cost);
     /* The error of light that is allowed per unit distance. */
     const vf allowed = f->allowance * (vf_set(1 / f->reach[volume]) + opacities / vf_muladd(length, opacities, one));
-    const vm few =
-        vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
-              allowed);
+    const vm few = vf_le(
+        kernel_local_bound_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
+        allowed);
     const vf half = vf_min(0.5f * (error_variation + weight_change), cost), made = half * mean;
     const vf rest = cost * (quartic + residual_error) + vf_min(3.1f * half, 2.1f * cost) * quartic;
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
@@ -212,7 +215,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_fra
 /* Sets p->count, the number of segments of each ray, so that no segment is longer than the sampling step. step, length:
  * the step and the interval in unit distances. Returns the rays that need more than 4 segments per part, for which one
  * polynomial is not accurate enough; none if the parts are already as short as allowed. */
-SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_count_segments_by_step(float step, vf length, kernel_local_pairs *p)
 {
     const vf wanted = vf_max(-vf_floor(length * (-1 / step)), vf_set(1));
     p->count = vf_min(wanted, vf_set(KERNEL_LOCAL_PIECES));
@@ -222,14 +225,14 @@ SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pa
 /* Sets p->count, the number of segments of each ray; returns the rays for which no number of segments is accurate
  * enough. The function first tests whether one segment is accurate enough, with bounds over all of the cell's values,
  * and with the error that is allowed in proportion to the interval's length. Only for rays that fail this test, it
- * calls kernel_local_count_by_depth(). */
+ * calls kernel_local_count_segments_by_depth(). */
 SIMD_INLINE vm kernel_local_choose_segment_counts(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
                                                   kernel_local_pairs *p)
 {
     const kernel_pieces *pieces = &f->pieces[volume];
     const vi lane = p->rays.lane;
     const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * p->per_t;
-    if (!(f->allowance > 0)) return kernel_local_count_by_step(f->volumes[volume].exponent, length, p);
+    if (!(f->allowance > 0)) return kernel_local_count_segments_by_step(f->volumes[volume].exponent, length, p);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const float square = p->share * p->share, unsampled = p->share < 1 ? 2 * square * square : 1;
     const vf unseen = unsampled * kernel_gather_lane(bounds->unsampled, lane);
@@ -246,18 +249,18 @@ SIMD_INLINE vm kernel_local_choose_segment_counts(const kernel_frame *f, int vol
     const vf one = vf_set(1), allowed = vf_set(f->allowance * (1 / f->reach[volume]));
     const vf error_variation = kernel_gather_lane(bounds->error_variation, lane),
              cost = kernel_gather_lane(bounds->cost, lane);
-    const vm strays = kernel_local_leaves_range(bounds, p);
-    vm enough = vm_andnot(
-        vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
-              allowed),
-        strays);
+    const vm strays = kernel_local_exceeds_bounded_values(bounds, p);
+    vm enough = vm_andnot(vf_le(kernel_local_bound_single_segment_error(mean, quartic, residual_error, weight_change,
+                                                                        error_variation, cost),
+                                allowed),
+                          strays);
     if (__builtin_expect(pieces->step_count > 0, 0))
-        enough = vm_andnot(enough, kernel_values_have_step(pieces, kernel_gather_lane(bounds->low, lane),
-                                                           kernel_gather_lane(bounds->high, lane)));
+        enough = vm_andnot(enough, kernel_has_opacity_step_in_range(pieces, kernel_gather_lane(bounds->low, lane),
+                                                                    kernel_gather_lane(bounds->high, lane)));
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
-    const vm none = kernel_local_count_by_depth(f, volume, mean, quartic, residual_error, weight_change, length,
-                                                vf_select(strays, 2.0f * one, one), p);
+    const vm none = kernel_local_count_segments_by_depth(f, volume, mean, quartic, residual_error, weight_change,
+                                                         length, vf_select(strays, 2.0f * one, one), p);
     p->count = vf_select(enough, one, p->count);
     return vm_andnot(none, enough);
 }

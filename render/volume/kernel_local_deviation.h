@@ -22,11 +22,10 @@
  * are computed together.
  *
  * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
- * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
- *              r may be up to                                   derivative          gradients of b
- *     hex      |ρ|, |σ|, |κ| <= 0.52                            1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2
- *     wedge    0.02 outside, within the cell times 1.06         1.06 N              |(0.52, 0.707)|
- *     pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
+ * in the cell. If r lies slightly outside the cell (kernel_local_is_in_or_near_cell()), the derivative is at most 1.082
+ * N: r may be up to                                   derivative          gradients of b hex      |ρ|, |σ|, |κ| <= 0.52
+ * 1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2 wedge    0.02 outside, within the cell times 1.06         1.06 N
+ * |(0.52, 0.707)| pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
  * These regions are convex. So r errs by at most residual / (1 - 1.082 N), provided that r itself is no farther
  * outside, which is checked; rays that fail the check are processed by the inverse map. */
 #ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
@@ -93,14 +92,14 @@ typedef struct kernel_local_pairs {
 /* ---- cells ---- */
 
 /* Returns an upper bound of the gradient of nonlinear term number `term` in cells of this type. */
-SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
+SIMD_INLINE float kernel_local_get_nonlinear_slope_bound(int type, int term)
 {
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
 /* Returns the factor e of kernel_local_budget.h. It bounds deviations of the field from its chord that are 0 at the
  * quarters and the middle of the interval. */
-SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
+SIMD_INLINE float kernel_local_get_unsampled_factor(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
@@ -114,11 +113,11 @@ SIMD_INLINE void kernel_local_set_nonlinear_bounds(const kernel_local_cells *c, 
         vf own = vf_load(c->field[4 + k]);
         for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
         vf_store(out->terms[k], own);
-        most += vf_abs(own) * kernel_local_nonlinear_slope(type, k);
+        most += vf_abs(own) * kernel_local_get_nonlinear_slope_bound(type, k);
     }
     const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
     vf_store(out->bend, vf_load(c->bend));
-    vf_store(out->unsampled, kernel_local_nonlinear_unsampled(type) * vf_load(c->bend) * most);
+    vf_store(out->unsampled, kernel_local_get_unsampled_factor(type) * vf_load(c->bend) * most);
     vf_store(out->sensitivity, most / room);
     vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
 }
@@ -154,14 +153,14 @@ typedef struct kernel_local_places {
 } kernel_local_places;
 
 /* Computes the nonlinear terms (products of coordinates) at the reference coordinates r. */
-SIMD_INLINE void kernel_local_nonlinear_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
+SIMD_INLINE void kernel_local_evaluate_nonlinear_terms(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
     vf unused[KERNEL_NONLINEAR_TERMS][3];
     kernel_nonlinear_terms_at(type, r, out, unused);
 }
 
 /* Returns the rays whose reference coordinates r lie in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
-SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
+SIMD_INLINE vm kernel_local_is_in_or_near_cell(int type, const vf r[3])
 {
     if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_border_distance(type, r));
     const vf most = vf_max(vf_abs(r[0]), vf_abs(r[1])), half = vf_set(0.5f + KERNEL_DEVIATION_MARGIN);
@@ -171,12 +170,12 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 
 /* Computes the lines and chords between the ends of the rays' intervals, and gathers coefficients and limits of the
  * rays' cells (kernel_local_chord). lane: the lane that holds each ray's cell. */
-SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds, vi lane,
-                                       const kernel_point ends[2], int type, kernel_local_chord *out)
+SIMD_INLINE void kernel_local_compute_chords(const kernel_local_cells *cells, const kernel_local_bounds *bounds,
+                                             vi lane, const kernel_point ends[2], int type, kernel_local_chord *out)
 {
     vf first[KERNEL_NONLINEAR_TERMS], last[KERNEL_NONLINEAR_TERMS];
-    kernel_local_nonlinear_at(type, ends[0].r, first);
-    kernel_local_nonlinear_at(type, ends[1].r, last);
+    kernel_local_evaluate_nonlinear_terms(type, ends[0].r, first);
+    kernel_local_evaluate_nonlinear_terms(type, ends[1].r, last);
     for (int a = 0; a < 3; a++) {
         out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
         out->span[a] = ends[1].r[a] - ends[0].r[a];
@@ -194,10 +193,11 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
 /* Computes the residual y - (r + n(r)) of the reference coordinates r = p->r at position u on the interval, where y is
  * linear along the ray and n(r) are the map's nonlinear terms (top of this file). Stores the field's deviation at this
  * position as p->value. */
-SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int type, kernel_point *p, vf residual[3])
+SIMD_INLINE void kernel_local_compute_residual(const kernel_local_chord *c, vf u, int type, kernel_point *p,
+                                               vf residual[3])
 {
     vf term[KERNEL_NONLINEAR_TERMS];
-    kernel_local_nonlinear_at(type, p->r, term);
+    kernel_local_evaluate_nonlinear_terms(type, p->r, term);
     for (int a = 0; a < 3; a++) residual[a] = vf_muladd(c->span[a], u, c->middle[a]) - p->r[a];
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         term[k] -= vf_muladd(c->rise[k], u, c->mean[k]);
@@ -211,14 +211,14 @@ SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int ty
  * position u number i; at[i].r: its reference coordinates, on entry an initial guess. at[i].value becomes the field's
  * deviation there. *residual becomes the largest residual that is left at any position. Returns the rays for which all
  * at[i].r are valid: in the cell or slightly outside, with a small enough residual. */
-SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places, int count, vm rays, int type,
-                                   kernel_point *at, vf *residual)
+SIMD_INLINE vm kernel_local_refine_coordinates(const kernel_local_chord *c, const vf *places, int count, vm rays,
+                                               int type, kernel_point *at, vf *residual)
 {
     vf off[3][3];
     for (int n = 0;; n++) {
         *residual = vf_set(0);
         for (int i = 0; i < count; i++) {
-            kernel_local_residual(c, places[i], type, &at[i], off[i]);
+            kernel_local_compute_residual(c, places[i], type, &at[i], off[i]);
             *residual = vf_max((vf_abs(off[i][0]) + vf_abs(off[i][1])) + vf_abs(off[i][2]), *residual);
         }
         const vm open = vm_andnot(rays, vf_le(*residual, c->tolerance));
@@ -227,18 +227,19 @@ SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places
             for (int a = 0; a < 3; a++) at[i].r[a] = vf_select(open, at[i].r[a] + off[i][a], at[i].r[a]);
     }
     vm is_near = vf_le(*residual, c->residual_limit);
-    for (int i = 0; i < count; i++) is_near = vm_and(is_near, kernel_local_is_near(type, at[i].r));
+    for (int i = 0; i < count; i++) is_near = vm_and(is_near, kernel_local_is_in_or_near_cell(type, at[i].r));
     return is_near;
 }
 
 /* Computes the field's deviations at `count` positions u on the interval between `ends`, by the inverse map of the
  * packet's cell. */
-static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_local_chord *c, const kernel_point *ends,
-                                                                  const vf *u, int count, vm rays, vf *out)
+static __attribute__((noinline)) void kernel_local_find_deviations_by_map(const kernel_local_chord *c,
+                                                                          const kernel_point *ends, const vf *u,
+                                                                          int count, vm rays, vf *out)
 {
     for (int i = 0; i < count; i++) {
         const vf along = u[i] + 0.5f, t = ends[0].t + (ends[1].t - ends[0].t) * along;
-        const vf value = kernel_value_at(c->packet, c->map, c->interval, rays, t);
+        const vf value = kernel_evaluate_field_in_one_cell(c->packet, c->map, c->interval, rays, t);
         out[i] = value - (ends[0].value + (ends[1].value - ends[0].value) * along);
     }
 }
@@ -246,8 +247,8 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
 /* Evaluates the field at the places 1, 2 and 3 (kernel_local_places) if `step` is 1, and at the places 1 and 3 if
  * `step` is 2. On entry, p->r has guesses of the places' reference coordinates. ends: the ends of the whole
  * interval. */
-SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int step, vm rays,
-                                       int type, kernel_local_places *p)
+SIMD_INLINE void kernel_local_evaluate_field_at_places(const kernel_local_chord *c, const kernel_point *ends, int step,
+                                                       vm rays, int type, kernel_local_places *p)
 {
     kernel_point at[3];
     vf u[3], off[3], residual;
@@ -257,11 +258,11 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
         if (type != GRID_NO_TYPE) memcpy(at[count].r, p->r[i], sizeof p->r[i]);
     }
     if (type == GRID_NO_TYPE) {
-        kernel_local_map_deviations(c, ends, u, count, rays, off);
+        kernel_local_find_deviations_by_map(c, ends, u, count, rays, off);
         for (int i = 1, n = 0; i < 4; i += step, n++) p->off[i] = off[n];
         return;
     }
-    p->is_known = vm_and(p->is_known, kernel_local_newton(c, u, count, rays, type, at, &residual));
+    p->is_known = vm_and(p->is_known, kernel_local_refine_coordinates(c, u, count, rays, type, at, &residual));
     p->residual = vf_max(residual, p->residual);
     for (int i = 1, n = 0; i < 4; i += step, n++) {
         memcpy(p->r[i], at[n].r, sizeof p->r[i]);
@@ -282,7 +283,7 @@ SIMD_INLINE void kernel_local_sample_whole_interval(const kernel_local_chord *c,
         vf residual[3];
         memcpy(middle.r, c->middle, sizeof middle.r);
         for (int n = 0; n < 2; n++) {
-            kernel_local_residual(c, vf_set(0), type, &middle, residual);
+            kernel_local_compute_residual(c, vf_set(0), type, &middle, residual);
             for (int a = 0; a < 3; a++) middle.r[a] += residual[a];
         }
         for (int a = 0; a < 3; a++) {
@@ -294,14 +295,14 @@ SIMD_INLINE void kernel_local_sample_whole_interval(const kernel_local_chord *c,
             out->r[4][a] = ends[1].r[a];
         }
     }
-    kernel_local_evaluate(c, ends, 1, rays, type, out);
+    kernel_local_evaluate_field_at_places(c, ends, 1, rays, type, out);
 }
 
 /* Evaluates the field at the five places of one half (0 or 1) of the part p. Three of these places are places of p, at
  * which the field is already known. */
-SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const kernel_point ends[2],
-                                           const kernel_local_places *p, int half, vm rays, int type,
-                                           kernel_local_places *out)
+SIMD_INLINE void kernel_local_sample_half_interval(const kernel_local_chord *c, const kernel_point ends[2],
+                                                   const kernel_local_places *p, int half, vm rays, int type,
+                                                   kernel_local_places *out)
 {
     out->width = 0.5f * p->width;
     out->u = p->u + (float)half * out->width;
@@ -313,7 +314,7 @@ SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const ke
         for (int i = 1; i < 4; i += 2)
             for (int a = 0; a < 3; a++) out->r[i][a] = 0.5f * (out->r[i - 1][a] + out->r[i + 1][a]);
     }
-    kernel_local_evaluate(c, ends, 2, rays, type, out);
+    kernel_local_evaluate_field_at_places(c, ends, 2, rays, type, out);
 }
 
 /* Returns the number at position u of a whole interval (-1/2 to 1/2), at whose ends it is `first` and `last`, by linear
@@ -346,12 +347,12 @@ SIMD_INLINE void kernel_local_restrict_to_part(const kernel_local_pairs *whole, 
 }
 
 /* Computes p->field, the field's deviations on the whole interval in the cell, and the residual. */
-SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds,
-                                            kernel_local_pairs *p, int type)
+SIMD_INLINE void kernel_local_compute_deviations(const kernel_local_cells *cells, const kernel_local_bounds *bounds,
+                                                 kernel_local_pairs *p, int type)
 {
     kernel_local_chord chord;
     kernel_local_places places;
-    kernel_local_chord_of(cells, bounds, p->rays.lane, p->ends, type, &chord);
+    kernel_local_compute_chords(cells, bounds, p->rays.lane, p->ends, type, &chord);
     kernel_local_sample_whole_interval(&chord, p->ends, p->active, type, &places);
     p->has_diverged = vm_not(places.is_known);
     p->residual = places.residual;
@@ -360,14 +361,14 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
 
 /* Computes *out, the point at depth t on each of the given rays, between the ends of the ray's interval (`ends`).
  * Returns the rays for which Newton's method did not find the point's reference coordinates. */
-SIMD_INLINE vm kernel_local_point_at(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
-                                     kernel_point *out)
+SIMD_INLINE vm kernel_local_find_point_at_depth(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t,
+                                                int type, kernel_point *out)
 {
     const vf along = (t - ends[0].t) / (ends[1].t - ends[0].t), u = along - 0.5f;
     kernel_point at;
     vf residual;
     for (int a = 0; a < 3; a++) at.r[a] = vf_muladd(c->span[a], u, c->middle[a]);
-    const vm known = kernel_local_newton(c, &u, 1, rays, type, &at, &residual);
+    const vm known = kernel_local_refine_coordinates(c, &u, 1, rays, type, &at, &residual);
     at.t = t;
     at.value = (ends[0].value + (ends[1].value - ends[0].value) * along) + at.value;
     kernel_point_copy_lanes(rays, &at, out);

@@ -86,7 +86,7 @@ typedef struct kernel_tile_cells {
     kernel_transformed_curved curved;
     kernel_local_cells maps; /* the maps of the cells in `curved` */
     /* per lane: first and last column, first and last row of the tile's pixels in which the lane's cell may be visible
-     * (kernel_local_pixels()) */
+     * (kernel_local_compute_pixel_bounds()) */
     int32_t pixel_ends[4][SIMD_WIDTH];
     int alone; /* the lane whose cell is also stored in `cell` (kernel_tile_set_current_cell()); -1: none */
     kernel_pixel_list rays; /* pairs of a pixel, in a cell's box, and the lane of that cell */
@@ -139,8 +139,8 @@ SIMD_INLINE vm kernel_local_read_values(const kernel_transfer *t, const kernel_t
  * places: x, y and z of the cells' vertices in tile space. The margin of 1/100 pixel exceeds the rounding errors of
  * projected vertices whose distance from the plane of the eye is at least 1/1000 of the scene's distance; a cell with a
  * nearer vertex gets all pixels. */
-SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
-                                     int32_t ends[4][SIMD_WIDTH])
+SIMD_INLINE void kernel_local_compute_pixel_bounds(const kernel_tile_trace *t, int count, const vf places[3][8],
+                                                   int32_t ends[4][SIMD_WIDTH])
 {
     const bool flat = t->frame->job->camera.is_orthographic;
     const kernel_tile *tile = &t->tile;
@@ -186,10 +186,10 @@ SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, un
 /* Reads the vertices of the current vector's cells, sorts them, transforms them into tile space, and computes the
  * cells' maps. Returns a mask of the cells that may be visible. *lanes: mask of those that can be processed in lanes:
  * no edge has length zero, and the bend of the map (kernel_local.h) is less than most_bent. */
-SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                    float most_bent, unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_transform_cells_of_type(const kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                          float most_bent, unsigned *lanes, int type)
 {
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     kernel_transformed_curved *h = &cells->curved;
     int32_t vertices[8][SIMD_WIDTH];
     vf places[3][8], values[8];
@@ -200,24 +200,25 @@ SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, 
         for (int a = 0; a < 3; a++) places[a][i] = vf_load(h->at[a][i]);
         vf_store(h->at[3][i], values[i]);
     }
-    kernel_local_pixels(t, count, (const vf(*)[8])places, cells->pixel_ends);
+    kernel_local_compute_pixel_bounds(t, count, (const vf(*)[8])places, cells->pixel_ends);
     const vm smooth = kernel_local_compute_maps(type, (const vf(*)[8])places, values, most_bent, &cells->maps);
     *lanes = vm_bits(vm_andnot(vm_and(shows, smooth), collapsed));
     return vm_bits(shows);
 }
 
-static __attribute__((noinline)) unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                                 float most_bent, unsigned *lanes, int type)
+static __attribute__((noinline)) unsigned kernel_local_transform_cells(const kernel_tile_trace *t,
+                                                                       kernel_tile_cells *cells, float most_bent,
+                                                                       unsigned *lanes, int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_local_transform_of_type, t, cells, most_bent, lanes);
+    return KERNEL_OF_TYPE(type, kernel_local_transform_cells_of_type, t, cells, most_bent, lanes);
 }
 
 /* Reads the vertex indices of the queue's cells up to index `end` (excluded), unless they have been read before. */
 SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
     for (; q->indexed_count < end; q->indexed_count++)
-        kernel_arrays_vertices(p, q->cell[q->indexed_count], grid_type_vertices(type), q->vertex[0] + q->indexed_count,
-                               KERNEL_LOCAL_ROOM);
+        kernel_arrays_read_vertex_indices(p, q->cell[q->indexed_count], grid_type_vertex_count(type),
+                                          q->vertex[0] + q->indexed_count, KERNEL_LOCAL_ROOM);
 }
 
 /* Makes the first SIMD_WIDTH cells of the queue the current vector, and reads their vertex indices. Returns a mask of
@@ -228,7 +229,7 @@ SIMD_INLINE unsigned kernel_local_begin_vector(kernel_tile_cells *cells, kernel_
     kernel_local_read_indices(&cells->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
-        for (int i = 0; i < grid_type_vertices(type); i++) q->vertex[i][n] = q->vertex[i][0];
+        for (int i = 0; i < grid_type_vertex_count(type); i++) q->vertex[i][n] = q->vertex[i][0];
     }
     cells->current = q;
     cells->alone = -1;
@@ -264,8 +265,8 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
 
 /* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell: it is between the
  * three pairs of planes that bound the cell (kernel_local_cells.low and high). */
-SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
-                                            vf *near, vf *far)
+SIMD_INLINE void kernel_local_intersect_slabs(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
+                                              vf *near, vf *far)
 {
     const vf d[2] = {
         (rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_gather_lane(cells->origin[0], rays->lane),

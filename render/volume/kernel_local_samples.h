@@ -81,8 +81,8 @@ typedef struct kernel_tile_volume {
  * in the window of the first and the last of them; *last is less than *number if there are none. *number is limited to
  * the window's end, so that it does not overflow an int. base, step: depth of sample number 0, and distance between
  * samples in depth. */
-SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base, vf step, vf near, vf far, vf *number,
-                                           vf *last)
+SIMD_INLINE void kernel_local_find_sample_range(const kernel_tile_volume *v, vf base, vf step, vf near, vf far,
+                                                vf *number, vf *last)
 {
     const vf inverse = 1.0f / step, first = vf_set((float)v->first);
     const vf before = vf_floor(v->pad - ((near - base) * inverse - first));
@@ -114,8 +114,8 @@ SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, v
 
 /* Stores the ends of the rays' intervals in their cells (kernel_samples.t_in and t_out) for the samples in the given
  * lanes. places: position of each ray among the tile's packets; numbers: the samples' indices in the window. */
-static __attribute__((noinline, cold)) void kernel_local_store_contact(kernel_tile_volume *v, unsigned lanes, vi places,
-                                                                       vi numbers, vf t_in, vf t_out)
+static __attribute__((noinline, cold)) void
+kernel_local_store_cell_interval_ends(kernel_tile_volume *v, unsigned lanes, vi places, vi numbers, vf t_in, vf t_out)
 {
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
@@ -130,8 +130,8 @@ static __attribute__((noinline, cold)) void kernel_local_store_contact(kernel_ti
 
 /* Sets the values of those of the window's samples begin .. end - 1 that lie in the tile's current cell
  * (kernel_tile_cells.cell), on the given rays of a packet. */
-static __attribute__((noinline)) void kernel_curved_samples(kernel_tile_trace *t, int packet, vm rays, int begin,
-                                                            int end)
+static __attribute__((noinline)) void kernel_sample_current_cell(kernel_tile_trace *t, int packet, vm rays, int begin,
+                                                                 int end)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_packet *p = &t->packets[packet];
@@ -140,14 +140,14 @@ static __attribute__((noinline)) void kernel_curved_samples(kernel_tile_trace *t
     const int intervals = kernel_curved_intervals(p, &cells->cell, vm_and(p->active, rays), list);
     for (int k = 0; k < intervals; k++) {
         int first, last;
-        kernel_sample_range(p, s, &list[k], &first, &last);
+        kernel_find_samples_in_interval(p, s, &list[k], &first, &last);
         kernel_fill_sample_range(p, s, cells->cell_map, &list[k], &list[k], first > begin ? first : begin,
                                  last < end ? last : end);
     }
 }
 
 /* Computes the values of the samples n to n + SIMD_WIDTH - 1 of the list, as far as they lie inside their cells. */
-SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
+SIMD_INLINE void kernel_local_compute_sample_vector(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     const int left = b->sample_count - n;
@@ -166,7 +166,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
-    const vf value = kernel_local_value(type, &cells->maps, rays.lane, &points);
+    const vf value = kernel_local_evaluate_field(type, &cells->maps, rays.lane, &points);
     unsigned undecided = vm_bits(doubt) | kernel_local_store_samples(b, own, rays.at, numbers, value);
     memcpy(at, &rays.at, sizeof at);
     memcpy(number, &numbers, sizeof number);
@@ -175,14 +175,14 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
         const int i = __builtin_ctz(undecided);
         /* near the cell's border, the ray's crossings of faces decide whether the sample lies in the cell */
         if (kernel_tile_set_current_cell(t, lane[i]))
-            kernel_curved_samples(t, at[i] / SIMD_WIDTH, vm_from_bits(1u << at[i] % SIMD_WIDTH), number[i],
-                                  number[i] + 1);
+            kernel_sample_current_cell(t, at[i] / SIMD_WIDTH, vm_from_bits(1u << at[i] % SIMD_WIDTH), number[i],
+                                       number[i] + 1);
     }
 }
 
-SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_tile_volume *b, int type)
+SIMD_INLINE void kernel_local_compute_sample_vectors(kernel_tile_trace *t, kernel_tile_volume *b, int type)
 {
-    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_fill_lanes(t, b, type, n);
+    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_compute_sample_vector(t, b, type, n);
 }
 
 /* Computes the values of all listed samples, and empties the list. */
@@ -192,7 +192,7 @@ static __attribute__((noinline)) void kernel_local_compute_samples(kernel_tile_t
     if (!b->sample_count) return;
     vf_store(b->bits + b->sample_count, vf_set(0));
     vf_store(b->t + b->sample_count, vf_set(0));
-    KERNEL_OF_TYPE(type, kernel_local_fill_all, t, b);
+    KERNEL_OF_TYPE(type, kernel_local_compute_sample_vectors, t, b);
     b->sample_count = 0;
 }
 
@@ -208,10 +208,10 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
     vf base, step, near, far, number, last;
     kernel_lane_rays_begin(&rays, t, &cells->rays, n);
     const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
-    kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
+    kernel_local_intersect_slabs(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
-    kernel_local_sample_range(b, base, step, depth + near, vf_min(depth + far, vf_gather(b->far, rays.at)), &number,
-                              &last);
+    kernel_local_find_sample_range(b, base, step, depth + near, vf_min(depth + far, vf_gather(b->far, rays.at)),
+                                   &number, &last);
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(rays.active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
         if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_compute_samples(t, type);
@@ -236,7 +236,7 @@ static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_tra
 
 static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, int type, unsigned *lanes)
 {
-    return kernel_local_transform(t, t->thread->tile_cells, KERNEL_LOCAL_BENT, lanes, type);
+    return kernel_local_transform_cells(t, t->thread->tile_cells, KERNEL_LOCAL_BENT, lanes, type);
 }
 
 /* Prepares the sampling of a volume in a window. Copies, from the packets of the given blocks, which must be set up,

@@ -66,8 +66,9 @@ typedef struct kernel_tile_segments {
 /* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
  * none. The function works ray by ray, and is used only if rays may cross more transparent surfaces than kernel_hits
  * stores. places: position of each ray among the tile's packets. */
-static __attribute__((noinline, cold)) vf
-kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
+static __attribute__((noinline, cold)) vf kernel_local_find_next_cut_ray_by_ray(const kernel_tile_trace *t,
+                                                                                const kernel_tile_segments *b,
+                                                                                vi places, vm rays, vf from)
 {
     int32_t at[SIMD_WIDTH];
     float next[SIMD_WIDTH];
@@ -75,20 +76,21 @@ kernel_local_next_cut_singly(const kernel_tile_trace *t, const kernel_tile_segme
     vf_store(next, vf_set(INFINITY));
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), packet = at[i] / SIMD_WIDTH;
-        next[i] = kernel_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
+        next[i] =
+            kernel_find_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
     }
     return vf_load(next);
 }
 
 /* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
  * none. places: position of each ray among the tile's packets. */
-static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
-                                                          vi places, vm rays, vf from)
+static __attribute__((noinline)) vf
+kernel_local_find_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places, vm rays, vf from)
 {
     enum { HITS = sizeof(kernel_hits) / sizeof(float) };
     vf next = vf_set(INFINITY);
     if (!b->has_cuts) return next;
-    if (b->has_overflowed) return kernel_local_next_cut_singly(t, b, places, rays, from);
+    if (b->has_overflowed) return kernel_local_find_next_cut_ray_by_ray(t, b, places, rays, from);
     const vi hits = places / SIMD_WIDTH * HITS, at = hits + (places & (SIMD_WIDTH - 1));
     const vf bits = vf_gather((const float *)(const void *)&t->hits[0].cut_count, hits);
     const vf count = vf_select(rays, vf_from_vi(vi_from_bits(bits)), vf_set(0));
@@ -103,16 +105,16 @@ static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trac
 /* Cuts intervals of rays at surfaces, and adds the resulting segments that lie between the depths reach[0] and reach[1]
  * and begin in the rays' windows. i: the intervals of the given rays, on which the field must be linear; whole: the
  * same intervals as segments; places: position of each ray among the tile's packets. */
-static __attribute__((noinline)) void kernel_linear_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
-                                                             vi places, vm rays, const kernel_interval *i,
-                                                             const vf reach[2], const kernel_unit_segment *whole)
+static __attribute__((noinline)) void kernel_add_linear_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                 vi places, vm rays, const kernel_interval *i,
+                                                                 const vf reach[2], const kernel_unit_segment *whole)
 {
     const vf begin = vf_gather(s->window, 2 * places), end = vf_min(i->t_out, reach[1]);
     vf from = vf_max(i->t_in, reach[0]);
     for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-        const vf to = vf_min(end, kernel_local_next_cut(t, s, places, open, from));
+        const vf to = vf_min(end, kernel_local_find_next_cut(t, s, places, open, from));
         const kernel_unit_segment part =
-            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
+            kernel_cut_part_of_unit_segment(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
         kernel_segments_add(s->packets, false, s->is_double, places, vm_and(open, vf_le(begin, from)), from, to, &part);
         from = to;
     }
@@ -133,13 +135,13 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
 
 /* The following two functions evaluate the polynomial (1/4 - u^2) (f[0] + f[1] u + f[2] u^2) that is fitted to the
  * field's deviation from its chord. It is 0 at the interval's ends, u = -1/2 and 1/2. kernel_local_deviation() returns
- * its value at u, kernel_local_primitive() its integral from 0 to u. */
+ * its value at u, kernel_local_integrate_deviation() its integral from 0 to u. */
 SIMD_INLINE vf kernel_local_deviation(const vf f[3], vf u)
 {
     return (0.25f - u * u) * vf_muladd(vf_muladd(f[2], u, f[1]), u, f[0]);
 }
 
-SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
+SIMD_INLINE vf kernel_local_integrate_deviation(const vf f[3], vf u)
 {
     const vf square = u * u;
     const vf odd = f[0] * (0.25f - square * (1.0f / 3)) + f[2] * square * (1.0f / 12 - square * 0.2f);
@@ -150,7 +152,7 @@ SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
  * the field. */
 SIMD_INLINE void kernel_local_add_single_segments(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
-    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
+    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_compute_segment_offset(p);
     kernel_local_store_segments(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), t0, t1,
                                 p->ends[0].value + lift, p->ends[1].value + lift);
 }
@@ -163,12 +165,12 @@ static __attribute__((noinline)) void kernel_local_add_equal_segments(kernel_til
     const vf *d = p->field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value, v1 = p->ends[1].value;
     const vf share = 1.0f / p->count, length = t1 - t0, rise = v1 - v0, middle = 4.0f * d[1];
     const vf f[3] = {middle, (32.0f / 3) * (d[2] - d[0]), 16.0f * ((8.0f / 3) * (d[0] + d[2]) - middle)};
-    vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(f, u0);
+    vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_integrate_deviation(f, u0);
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
         const vf number = vf_set((float)n), along = number * share;
         const vm inner = vm_and(open, vf_lt(number, p->count));
-        const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(f, u1);
+        const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_integrate_deviation(f, u1);
         const vf to = vf_select(inner, t0 + length * along, t1), off1 = kernel_local_deviation(f, u1);
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
@@ -183,7 +185,7 @@ static __attribute__((noinline)) void kernel_local_add_equal_segments(kernel_til
 }
 
 /* Adds the segments of the given rays; p->count has the number of segments of each ray. */
-SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_add_segments(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
     kernel_local_add_single_segments(b, p, single);
@@ -192,8 +194,8 @@ SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_p
 
 /* ---- division of intervals into parts ---- */
 
-static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
-                                                 const vf reach[2], float share);
+static void kernel_local_add_segments_cell_by_cell(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
+                                                   const vf reach[2], float share);
 
 /* Adds the segments of the rays' intervals. An interval is halved, and its parts again, until the error bounds allow a
  * part to be divided into a few equal segments (kernel_local_choose_segment_counts()). The shortest parts for which the
@@ -216,38 +218,38 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
             vm_or(kernel_local_choose_segment_counts(t->frame, b->volume, bounds, &part), part.has_diverged);
         const vm good = vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
-        kernel_local_emit(b, &part, good);
+        kernel_local_add_segments(b, &part, good);
         if (!vm_any(rest)) continue;
         const vf reach[2] = {part.ends[0].t, part.ends[1].t};
         if (part.share > KERNEL_LOCAL_LEAST_SHARE) {
             for (int half = 1; half >= 0; half--, count++) {
-                kernel_local_places_halve(chord, whole->ends, &places, half, rest, type, &stack[count]);
+                kernel_local_sample_half_interval(chord, whole->ends, &places, half, rest, type, &stack[count]);
                 mine[count] = rest;
             }
         } else if (type == GRID_NO_TYPE) {
             kernel_segments *list = &b->packets[chord->packet - t->packets];
             kernel_interval_bisect(chord->packet, list, chord->cell, chord->interval, rest, reach[0], reach[1]);
         } else {
-            kernel_local_segments_process_singly(t, part.rays.at, part.rays.lane, vm_bits(rest), reach, part.share);
+            kernel_local_add_segments_cell_by_cell(t, part.rays.at, part.rays.lane, vm_bits(rest), reach, part.share);
         }
     }
 }
 
-SIMD_INLINE void kernel_local_segments_parts_of(kernel_tile_trace *t, const kernel_local_pairs *whole, vm rays,
-                                                int type)
+SIMD_INLINE void kernel_local_subdivide_intervals_of_type(kernel_tile_trace *t, const kernel_local_pairs *whole,
+                                                          vm rays, int type)
 {
     const kernel_local_bounds *bounds = &t->thread->tile_segments->bounds;
     kernel_local_chord chord;
-    kernel_local_chord_of(&t->thread->tile_cells->maps, bounds, whole->rays.lane, whole->ends, type, &chord);
+    kernel_local_compute_chords(&t->thread->tile_cells->maps, bounds, whole->rays.lane, whole->ends, type, &chord);
     kernel_local_divide_intervals(t, bounds, &chord, whole, rays, type);
 }
 
 /* Adds the segments of the intervals of the given rays in the current vector's cells
  * (kernel_local_divide_intervals()). */
-static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_trace *t, const kernel_local_pairs *whole,
-                                                                  vm rays, int type)
+static __attribute__((noinline)) void
+kernel_local_subdivide_intervals(kernel_tile_trace *t, const kernel_local_pairs *whole, vm rays, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_local_segments_parts_of, t, whole, rays);
+    KERNEL_OF_TYPE(type, kernel_local_subdivide_intervals_of_type, t, whole, rays);
 }
 
 /* ---- packets of rays in one cell ---- */
@@ -255,23 +257,23 @@ static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_tr
 /* For a hex, wedge or pyramid with a constant field: adds the rays' intervals in the cell as segments, cut at surfaces.
  * The value is computed in double if s->is_double is set, because narrow ramps magnify its rounding. reach: first and
  * last depth of the segments to add. */
-static __attribute__((noinline)) void kernel_constant_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
-                                                               vi places, const kernel_cell *c,
-                                                               const kernel_interval *i, const vf reach[2])
+static __attribute__((noinline)) void kernel_add_constant_segments(const kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                   vi places, const kernel_cell *c,
+                                                                   const kernel_interval *i, const vf reach[2])
 {
-    const double exact = kernel_double_domain(&t->frame->volumes[s->volume], c->values[0]);
+    const double exact = kernel_map_to_domain_in_double(&t->frame->volumes[s->volume], c->values[0]);
     const vf value = vf_set((float)exact);
     kernel_unit_segment whole =
         kernel_unit_segment_of((i->t_out - i->t_in) * vf_gather(s->per_t, places), value, value);
     if (s->is_double) whole.rest_in = whole.rest_out = vf_set((float)(exact - (double)(float)exact));
-    kernel_linear_segments(t, s, places, i->mask, i, reach, &whole);
+    kernel_add_linear_segments(t, s, places, i->mask, i, reach, &whole);
 }
 
 /* Adds the segments of a packet's rays in the tile's current cell (kernel_tile_cells.cell), between the depths reach[0]
  * and reach[1]. share: length between these depths, as a share of the rays' intervals in the cell; lane: the lane of
  * the cell in the current vector, whose error bounds are then used; -1: the cell is not in it. */
-static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, vm rays,
-                                                             const vf reach[2], float share, int lane)
+static __attribute__((noinline)) void kernel_add_segments_in_current_cell(kernel_tile_trace *t, int packet, vm rays,
+                                                                          const vf reach[2], float share, int lane)
 {
     const kernel_cell *c = &t->thread->tile_cells->cell;
     const kernel_map *map = t->thread->tile_cells->cell_map;
@@ -282,28 +284,29 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
     kernel_local_bounds own_bounds;
     const kernel_local_bounds *bounds = lane < 0 ? &own_bounds : &b->bounds;
     kernel_local_chord chord = {.packet = p, .map = map, .cell = c};
-    kernel_local_pairs whole = {.begin = list->t_begin,
-                                .per_t = list->per_t,
-                                .share = share,
-                                .rays = {.at = kernel_packet_places(packet), .lane = vi_set(lane < 0 ? 0 : lane)}};
+    kernel_local_pairs whole = {
+        .begin = list->t_begin,
+        .per_t = list->per_t,
+        .share = share,
+        .rays = {.at = kernel_list_positions_in_packet(packet), .lane = vi_set(lane < 0 ? 0 : lane)}};
     const int count = kernel_curved_intervals(p, c, rays, intervals);
-    if (count && map && lane < 0) kernel_local_bound_of_cell(t->frame, b->volume, c, &own_bounds);
+    if (count && map && lane < 0) kernel_local_set_bounds_of_single_cell(t->frame, b->volume, c, &own_bounds);
     for (int k = 0; k < count; k++) {
         const vf end = vf_min(intervals[k].t_out, reach[1]);
         vf from = vf_max(intervals[k].t_in, reach[0]);
         vm open = vm_and(intervals[k].mask, vf_lt(from, end));
         chord.interval = &intervals[k];
         if (!map) {
-            kernel_constant_segments(t, b, whole.rays.at, c, &intervals[k], reach);
+            kernel_add_constant_segments(t, b, whole.rays.at, c, &intervals[k], reach);
             continue;
         }
         for (; vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-            const vf to = vf_min(end, kernel_local_next_cut(t, b, whole.rays.at, open, from));
+            const vf to = vf_min(end, kernel_local_find_next_cut(t, b, whole.rays.at, open, from));
             const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
             whole.ends[0].t = from;
             whole.ends[1].t = from = to;
             for (int n = 0; n < 2; n++)
-                whole.ends[n].value = kernel_value_at(p, map, &intervals[k], mine, whole.ends[n].t);
+                whole.ends[n].value = kernel_evaluate_field_in_one_cell(p, map, &intervals[k], mine, whole.ends[n].t);
             if (vm_any(mine)) kernel_local_divide_intervals(t, bounds, &chord, &whole, mine, GRID_NO_TYPE);
         }
     }
@@ -313,10 +316,10 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
 
 /* Adds the segments of the rays in `wanted` (a mask of lanes) between the depths reach[0] and reach[1], by packets,
  * cell by cell; rays with the same cell and packet are processed together. places: position of each ray among the
- * tile's packets; lanes: the lane of each ray's cell; share: as in kernel_curved_segments(). */
-static __attribute__((noinline)) void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes,
-                                                                           unsigned wanted, const vf reach[2],
-                                                                           float share)
+ * tile's packets; lanes: the lane of each ray's cell; share: as in kernel_add_segments_in_current_cell(). */
+static __attribute__((noinline)) void kernel_local_add_segments_cell_by_cell(kernel_tile_trace *t, vi places, vi lanes,
+                                                                             unsigned wanted, const vf reach[2],
+                                                                             float share)
 {
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
     float depths[2][SIMD_WIDTH];
@@ -335,39 +338,41 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
             wanted &= ~(1u << i);
         }
         if (!kernel_tile_set_current_cell(t, lane[first])) continue;
-        kernel_curved_segments(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own, share,
-                               lane[first]);
+        kernel_add_segments_in_current_cell(t, packet, vm_and(t->packets[packet].active, vm_from_bits(same)), own,
+                                            share, lane[first]);
     }
 }
 
 /* Adds the segments, between the depths reach[0] and reach[1], of rays whose intervals are cut by surfaces or begin or
  * end outside these depths. */
-SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_segments *b,
-                                              const kernel_local_pairs *whole, vm rays, const vf reach[2], int type)
+SIMD_INLINE void kernel_local_add_cut_segments_of_type(kernel_tile_trace *t, kernel_tile_segments *b,
+                                                       const kernel_local_pairs *whole, vm rays, const vf reach[2],
+                                                       int type)
 {
     const kernel_local_cells *cells = &t->thread->tile_cells->maps;
     const vf end = vf_min(whole->ends[1].t, reach[1]);
     kernel_local_pairs part = *whole;
     kernel_local_chord chord;
-    kernel_local_chord_of(cells, &b->bounds, whole->rays.lane, whole->ends, type, &chord);
+    kernel_local_compute_chords(cells, &b->bounds, whole->rays.lane, whole->ends, type, &chord);
     vf from = vf_max(whole->ends[0].t, reach[0]);
     for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-        const vf between[2] = {from, vf_min(end, kernel_local_next_cut(t, b, whole->rays.at, open, from))};
+        const vf between[2] = {from, vf_min(end, kernel_local_find_next_cut(t, b, whole->rays.at, open, from))};
         vm alone = vm_none();
         for (int n = 0; n < 2; n++)
-            alone = vm_or(alone, kernel_local_point_at(&chord, whole->ends, open, between[n], type, &part.ends[n]));
-        kernel_local_segments_parts(t, &part, vm_andnot(open, alone), type);
+            alone = vm_or(alone,
+                          kernel_local_find_point_at_depth(&chord, whole->ends, open, between[n], type, &part.ends[n]));
+        kernel_local_subdivide_intervals(t, &part, vm_andnot(open, alone), type);
         if (__builtin_expect(vm_any(alone), 0))
-            kernel_local_segments_process_singly(t, whole->rays.at, whole->rays.lane, vm_bits(alone), between, 1);
+            kernel_local_add_segments_cell_by_cell(t, whole->rays.at, whole->rays.lane, vm_bits(alone), between, 1);
         from = between[1];
     }
 }
 
-static __attribute__((noinline)) void kernel_local_segments_cut(kernel_tile_trace *t, kernel_tile_segments *b,
-                                                                const kernel_local_pairs *whole, vm rays,
-                                                                const vf reach[2], int type)
+static __attribute__((noinline)) void kernel_local_add_cut_segments(kernel_tile_trace *t, kernel_tile_segments *b,
+                                                                    const kernel_local_pairs *whole, vm rays,
+                                                                    const vf reach[2], int type)
 {
-    KERNEL_OF_TYPE(type, kernel_local_segments_cut_of, t, b, whole, rays, reach);
+    KERNEL_OF_TYPE(type, kernel_local_add_cut_segments_of_type, t, b, whole, rays, reach);
 }
 
 /* Appends rays to a list of rays. words: per lane, the word that describes a ray; rays: the lanes that are appended. */
@@ -391,14 +396,14 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, c
 /* Finds the crossed faces of up to SIMD_WIDTH rays, from index n on of the list KERNEL_LOCAL_MET. Rays that certainly
  * cross exactly two faces once each are added to KERNEL_LOCAL_CROSSED or KERNEL_LOCAL_CROSSED_TRIANGLE. Rays for which
  * that is uncertain are processed cell by cell. */
-SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
+SIMD_INLINE void kernel_local_list_crossing_rays(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
     vm two, alone;
     vi words, face[2];
     const vm all = kernel_local_list_load(b, KERNEL_LOCAL_MET, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&t->thread->tile_cells->curved, &rays, all, type, &two, &alone, face);
-    const vm on_quad = kernel_curved_on_quad(type, 0, face[0]);
+    kernel_local_find_crossed_faces(&t->thread->tile_cells->curved, &rays, all, type, &two, &alone, face);
+    const vm on_quad = kernel_is_crossed_face_a_quad(type, 0, face[0]);
     words = words | face[0] << KERNEL_LOCAL_FACES | face[1] << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(b, KERNEL_LOCAL_CROSSED, vm_and(two, on_quad), words);
     if (kernel_has_triangles(type))
@@ -406,13 +411,14 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     if (__builtin_expect(vm_any(alone), 0)) {
         vf reach[2];
         vf_gather_pair(b->reach, 2 * rays.at, &reach[0], &reach[1]);
-        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(alone), reach, 1);
+        kernel_local_add_segments_cell_by_cell(t, rays.at, rays.lane, vm_bits(alone), reach, 1);
     }
 }
 
 /* Adds the segments of up to SIMD_WIDTH rays, from index n on of a list of rays with two crossed faces
  * (KERNEL_LOCAL_CROSSED or KERNEL_LOCAL_CROSSED_TRIANGLE). */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b, int list, int type, int n)
+SIMD_INLINE void kernel_local_add_segments_of_listed_rays(kernel_tile_trace *t, kernel_tile_segments *b, int list,
+                                                          int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_local_pairs p;
@@ -421,51 +427,52 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
     p.share = 1;
     p.active = kernel_local_list_load(b, list, &t->tile, n, &words, &p.rays);
     const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_cross(&cells->curved, &p.rays, p.active, type, face, p.ends);
+    kernel_local_compute_crossing_points(&cells->curved, &p.rays, p.active, type, face, p.ends);
     p.per_t = vf_gather(b->per_t, p.rays.at);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
     vm cut = vm_or(vf_lt(p.ends[0].t, reach[0]), vf_lt(reach[1], p.ends[1].t));
     if (b->has_cuts)
-        cut = vm_or(cut, vf_lt(kernel_local_next_cut(t, b, p.rays.at, p.active, p.ends[0].t), p.ends[1].t));
+        cut = vm_or(cut, vf_lt(kernel_local_find_next_cut(t, b, p.rays.at, p.active, p.ends[0].t), p.ends[1].t));
     cut = vm_and(cut, p.active);
-    if (__builtin_expect(vm_any(cut), 0)) kernel_local_segments_cut(t, b, &p, cut, reach, type);
+    if (__builtin_expect(vm_any(cut), 0)) kernel_local_add_cut_segments(t, b, &p, cut, reach, type);
     p.active = vm_andnot(p.active, cut);
-    kernel_local_deviations_of(&cells->maps, &b->bounds, &p, type);
+    kernel_local_compute_deviations(&cells->maps, &b->bounds, &p, type);
     const vm alone = vm_and(p.active, p.has_diverged);
     p.active = vm_andnot(p.active, alone);
     const vm coarse = vm_and(p.active, kernel_local_choose_segment_counts(t->frame, b->volume, &b->bounds, &p));
-    kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
-    if (__builtin_expect(vm_any(coarse), 0)) kernel_local_segments_parts(t, &p, coarse, type);
+    kernel_local_add_segments(b, &p, vm_andnot(p.active, coarse));
+    if (__builtin_expect(vm_any(coarse), 0)) kernel_local_subdivide_intervals(t, &p, coarse, type);
     if (__builtin_expect(vm_any(alone), 0))
-        kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone), reach, 1);
+        kernel_local_add_segments_cell_by_cell(t, p.rays.at, p.rays.lane, vm_bits(alone), reach, 1);
 }
 
 /* Adds rays to the list KERNEL_LOCAL_MET: of the vector of rays that begins at index n of the list of pixels, those
  * that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_list_met(const kernel_tile_trace *t, const kernel_tile_cells *cells,
-                                                kernel_tile_segments *b, int n)
+SIMD_INLINE void kernel_local_list_rays_meeting_cells(const kernel_tile_trace *t, const kernel_tile_cells *cells,
+                                                      kernel_tile_segments *b, int n)
 {
     const vi pixel = kernel_load_bytes(cells->rays.pixel + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_begin(&rays, t, &cells->rays, n);
     const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
-    kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
+    kernel_local_intersect_slabs(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
     kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(rays.active, meets), pixel | rays.lane << KERNEL_LOCAL_CELL);
 }
 
 /* Processes the rays in the list KERNEL_LOCAL_MET: finds the crossed faces, then adds the segments. */
-SIMD_INLINE void kernel_local_segments_process_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
+SIMD_INLINE void kernel_local_process_rays_meeting_cells(kernel_tile_trace *t, kernel_tile_segments *b, int type)
 {
     const int met = b->list_count[KERNEL_LOCAL_MET];
     b->list_count[KERNEL_LOCAL_CROSSED] = b->list_count[KERNEL_LOCAL_CROSSED_TRIANGLE] = 0;
-    for (int n = 0; n < met; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, type, n);
+    for (int n = 0; n < met; n += SIMD_WIDTH) kernel_local_list_crossing_rays(t, b, type, n);
     for (int list = KERNEL_LOCAL_CROSSED; list <= KERNEL_LOCAL_CROSSED_TRIANGLE; list++)
-        for (int n = 0; n < b->list_count[list]; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, list, type, n);
+        for (int n = 0; n < b->list_count[list]; n += SIMD_WIDTH)
+            kernel_local_add_segments_of_listed_rays(t, b, list, type, n);
 }
 
 /* Adds the segments of all rays in the list of pixels, and empties the list. */
@@ -475,20 +482,21 @@ static __attribute__((noinline)) void kernel_local_segments_process_pixels(kerne
     kernel_tile_segments *b = t->thread->tile_segments;
     kernel_pixel_list_pad(&cells->rays);
     b->list_count[KERNEL_LOCAL_MET] = 0;
-    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_segments_list_met(t, cells, b, n);
-    KERNEL_OF_TYPE(type, kernel_local_segments_process_met, t, b);
+    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_list_rays_meeting_cells(t, cells, b, n);
+    KERNEL_OF_TYPE(type, kernel_local_process_rays_meeting_cells, t, b);
     cells->rays.count = 0;
 }
 
 /* ---- cells ---- */
 
 /* Computes the faces and the error bounds of the current vector of cells, which the functions for segments use. */
-SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_tile_cells *cells,
-                                               kernel_tile_segments *s, int type)
+SIMD_INLINE void kernel_local_prepare_faces_and_bounds(const kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                       kernel_tile_segments *s, int type)
 {
-    kernel_local_compute_faces(&t->tile, &cells->curved, cells->pixel_ends, type);
+    kernel_local_prepare_cell_faces(&t->tile, &cells->curved, cells->pixel_ends, type);
     kernel_local_set_nonlinear_bounds(&cells->maps, type, &s->bounds);
-    kernel_local_set_bounds(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
+    kernel_local_set_light_error_bounds(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type,
+                                        &s->bounds);
 }
 
 /* Transforms the current vector of cells into tile space. Returns a mask of the visible cells; *lanes: mask of those
@@ -498,8 +506,8 @@ static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_segments *s = t->thread->tile_segments;
-    const unsigned showing = kernel_local_transform(t, cells, KERNEL_LOCAL_BENT_MOST, lanes, type);
-    KERNEL_OF_TYPE(type, kernel_local_segments_prepare, t, cells, s);
+    const unsigned showing = kernel_local_transform_cells(t, cells, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    KERNEL_OF_TYPE(type, kernel_local_prepare_faces_and_bounds, t, cells, s);
     return showing;
 }
 
@@ -514,7 +522,7 @@ SIMD_INLINE void kernel_block_set_window_end(kernel_tile_trace *t, const kernel_
 
 /* Lowers the depth in t->far of those of the given blocks in which the window of a ray has been shortened, because its
  * list was full. */
-SIMD_INLINE void kernel_blocks_shorten(kernel_tile_trace *t, unsigned blocks)
+SIMD_INLINE void kernel_update_shortened_windows(kernel_tile_trace *t, unsigned blocks)
 {
     kernel_segments *packets = t->thread->tile_segments->packets;
     for (; blocks; blocks &= blocks - 1) {
@@ -531,7 +539,7 @@ SIMD_INLINE void kernel_blocks_shorten(kernel_tile_trace *t, unsigned blocks)
 static void kernel_local_segments_finish(kernel_tile_trace *t, int unused)
 {
     (void)unused;
-    kernel_blocks_shorten(t, t->thread->tile_segments->blocks);
+    kernel_update_shortened_windows(t, t->thread->tile_segments->blocks);
 }
 
 /* Prepares segments of a volume in a window. Copies, from the packets of the given blocks, each ray's window and the

@@ -33,7 +33,7 @@
  * max_error L / reach, where reach is the length of the longest ray, times the transmittance in front of the segment:
  * summed over a ray at most 0.2 max_error. If the error is larger, the segment is divided into subintervals over which
  * the value changes by equal amounts; the error of the absorption falls with the square of their number. If too many
- * subintervals would be needed, or a bin is too wide, kernel_integrate() computes the segment. */
+ * subintervals would be needed, or a bin is too wide, kernel_integrate_segments() computes the segment. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 
@@ -65,7 +65,7 @@ typedef struct kernel_preint_subinterval {
 } kernel_preint_subinterval;
 
 /* Looks up the bin of each lane's value. */
-SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kernel_preint_end *e)
+SIMD_INLINE void kernel_preint_look_up_value(const kernel_preintegral *t, vf value, kernel_preint_end *e)
 {
     const vf y = (value - t->low) * t->inverse + 1.0f;
     const float *entries = (const float *)t->entries;
@@ -86,7 +86,7 @@ SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kerne
 
 /* Returns 1 - exp(-y); *share becomes this number divided by y. For small y a series is used, whose first omitted term
  * is y^6 / 5040. */
-SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
+SIMD_INLINE vf kernel_compute_absorption(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
     p = p * y - 1.0f / 24;
@@ -104,13 +104,13 @@ SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
 }
 
 /* Returns a channel of a packed colour. */
-SIMD_INLINE vf kernel_preint_channel(const kernel_preintegral *t, vi colour, int channel)
+SIMD_INLINE vf kernel_preint_unpack_colour_channel(const kernel_preintegral *t, vi colour, int channel)
 {
     return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
 }
 
 /* Returns an upper bound of the deviation of a colour channel from its chord between two values. */
-SIMD_INLINE vf kernel_preint_colour_deviation(const kernel_preintegral *t, vf v0, vf v1)
+SIMD_INLINE vf kernel_preint_bound_colour_deviation(const kernel_preintegral *t, vf v0, vf v1)
 {
     const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
     const vm outside = vm_or(vf_lt(low, vf_set(0)), vf_lt(vf_set(1), high));
@@ -134,19 +134,20 @@ SIMD_INLINE void kernel_preint_compute_light(const kernel_preintegral *t, const 
         sum[i] = ((all - own) + (of_a * a->own[i] + of_b * b->own[i])) * per_bin;
     }
     out->depth = sum[0] * t->depth_unit;
-    const vf gone = kernel_absorbed_share(0.5f * out->depth, &mean);
+    const vf gone = kernel_compute_absorption(0.5f * out->depth, &mean);
     /* mean: mean transmittance along the segment; it is the absorption divided by the optical depth */
     mean *= 1.0f - 0.5f * gone;
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
     mean *= t->light_unit;
     out->absorbed = gone * (2.0f - gone);
     for (int c = 0; c < 3; c++) {
-        const vf rise = kernel_preint_channel(t, b->colour, c) - kernel_preint_channel(t, a->colour, c);
+        const vf rise =
+            kernel_preint_unpack_colour_channel(t, b->colour, c) - kernel_preint_unpack_colour_channel(t, a->colour, c);
         change = vf_max(change, vf_abs(rise));
         out->colour[c] = sum[1 + c] * mean - (0.25f * rise) * square;
     }
     const vf table_error = (a->table_error + b->table_error) * vf_min(one, 0.5f * inverse);
-    out->error = (0.25f * change + kernel_preint_colour_deviation(t, a->value, b->value)) * square;
+    out->error = (0.25f * change + kernel_preint_bound_colour_deviation(t, a->value, b->value)) * square;
     out->table_error = table_error * length;
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
@@ -167,7 +168,7 @@ static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_prein
         const vm inner = vf_lt(number, count), open = vf_le(number, count);
         kernel_preint_end *end = &ends[n & 1];
         kernel_preint_subinterval sub;
-        kernel_preint_find(t, vf_select(inner, from->value + rise * number, v_out), end);
+        kernel_preint_look_up_value(t, vf_select(inner, from->value + rise * number, v_out), end);
         kernel_preint_compute_light(t, begin, end, vf_select(open, length * share, zero), &sub);
         begin = end;
         for (int c = 0; c < 3; c++) all->colour[c] += clear * sub.colour[c];
@@ -196,7 +197,7 @@ SIMD_INLINE void kernel_light_replace(vm m, const kernel_light *by, kernel_light
 }
 
 /* Computes the light of segments for which a single subinterval is not accurate enough: by several subintervals or, if
- * that is not accurate enough either, by kernel_integrate(). */
+ * that is not accurate enough either, by kernel_integrate_segments(). */
 static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *pieces, vm rays,
                                                            const kernel_preint_end *from,
                                                            const kernel_unit_segment *run,
@@ -220,7 +221,7 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
     }
     if (!vm_any(left)) return;
     kernel_light exact = kernel_light_none();
-    kernel_integrate(pieces, left, run, &exact);
+    kernel_integrate_segments(pieces, left, run, &exact);
     kernel_light_replace(left, &exact, light);
 }
 
@@ -230,13 +231,14 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
  * this segment's end. The caller passes it as `begin` for the next segment. Both results are written in place, because
  * gcc 12 copies structs of vectors through memory: copying *end would take 4 %, and *light 11 % of a frame of tets
  * (AVX2). */
-SIMD_INLINE void kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
-                                      kernel_preint_end *begin, kernel_preint_end *end, kernel_light *light)
+SIMD_INLINE void kernel_preint_compute_segment_light(const kernel_pieces *pieces, vm rays,
+                                                     const kernel_unit_segment *run, kernel_preint_end *begin,
+                                                     kernel_preint_end *end, kernel_light *light)
 {
     kernel_preint_subinterval sub;
     if (vm_any(vm_andnot(rays, vf_eq(begin->value, run->v_in))))
-        kernel_preint_find(pieces->preintegral, run->v_in, begin);
-    kernel_preint_find(pieces->preintegral, run->v_out, end);
+        kernel_preint_look_up_value(pieces->preintegral, run->v_in, begin);
+    kernel_preint_look_up_value(pieces->preintegral, run->v_out, end);
     kernel_preint_compute_light(pieces->preintegral, begin, end, run->length, &sub);
     kernel_preint_get_light(&sub, light);
     const vm bad = vm_andnot(rays, vf_le(sub.error + sub.table_error, sub.allowed));

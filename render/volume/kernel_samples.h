@@ -69,7 +69,7 @@ typedef struct kernel_samples {
 } kernel_samples;
 
 /* Returns the depth of sample number m on each ray. */
-SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
+SIMD_INLINE vf kernel_get_sample_depth(const kernel_packet *p, int m)
 {
     return p->sample_base + p->sample_step * (float)m;
 }
@@ -78,7 +78,7 @@ SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
  * computed from a depth t has three rounding errors; a depth computed from a number m has two, of step * m and of t. So
  * the number computed from the depth of sample m differs from m by at most 6e-8 (4 m + t / step), and t / step is at
  * most m + base / step. */
-SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
+SIMD_INLINE void kernel_samples_set_window(const kernel_packet *p, kernel_samples *s, int first, int count)
 {
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
     s->first = first;
@@ -88,8 +88,8 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
 
 /* Finds the window's samples that may lie in the interval i of at least one ray: those with the indices *begin .. *end
  * - 1 in the window. */
-SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
-                                     int *begin, int *end)
+SIMD_INLINE void kernel_find_samples_in_interval(const kernel_packet *p, const kernel_samples *s,
+                                                 const kernel_interval *i, int *begin, int *end)
 {
     const vf from = (i->t_in - p->sample_base) * p->sample_inverse;
     const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
@@ -155,7 +155,7 @@ SIMD_INLINE void kernel_fill_sample_range(kernel_packet *p, kernel_samples *s, c
         vf value = i->v_in + slope * (t - i->t_in);
         if (map) {
             if (!vm_any(own)) continue;
-            value = kernel_value_at(p, map, i, own, t);
+            value = kernel_evaluate_field_in_one_cell(p, map, i, own, t);
         }
         const vf active = values[n];
         const vm apart = vm_and(own, vf_eq(active, active));
@@ -176,7 +176,7 @@ SIMD_INLINE void kernel_fill_interval_samples(kernel_packet *p, kernel_samples *
                                               const kernel_interval *i, const kernel_interval *cell)
 {
     int begin, end;
-    kernel_sample_range(p, s, i, &begin, &end);
+    kernel_find_samples_in_interval(p, s, i, &begin, &end);
     if (begin < end) kernel_fill_sample_range(p, s, map, i, cell, begin, end);
 }
 
@@ -217,8 +217,8 @@ SIMD_INLINE void kernel_emit_separate(kernel_packet *p, kernel_blend *b, vm has,
 /* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added. These are rays
  * with a transparent surface between the previous sample and sample n, and rays on which another rank's surface may lie
  * there, because the cells of the two samples do not touch. */
-SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples *s, int n, const kernel_hits *hits,
-                                   vf t)
+SIMD_INLINE vm kernel_blend_must_end_before_sample(const kernel_packet *p, const kernel_samples *s, int n,
+                                                   const kernel_hits *hits, vf t)
 {
     const kernel_blend *b = &s->blend;
     vm broken = hits->overflowed;
@@ -264,14 +264,14 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_samples *s, const 
     kernel_blend *b = &s->blend;
     const bool is_alone = p->frame->job->is_alone, is_folded = p->frame->job->reproducible;
     for (int n = 0; n < s->count; n++) {
-        const vf t = kernel_sample_t(p, s->first + n);
+        const vf t = kernel_get_sample_depth(p, s->first + n);
         vm has = vm_none();
         for (int v = 0; v < p->frame->volume_count; v++) has = vm_or(has, vf_eq(s->value[v][n], s->value[v][n]));
         has = vm_and(has, vm_and(vf_lt(t, p->t_far), vf_lt(vf_set(KERNEL_DARK), b->light)));
         has = vm_and(has, vf_le(p->clip_in, t));
         if (!is_alone) kernel_blend_close(p, b, vm_not(has));
         if (!vm_any(has)) continue;
-        kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, s, n, hits, t)));
+        kernel_blend_close(p, b, vm_and(has, kernel_blend_must_end_before_sample(p, s, n, hits, t)));
         const vm fresh = vm_andnot(has, b->open);
         vf colour[3], clear;
         kernel_sample_colour(p, s, n, colour, &clear);

@@ -70,7 +70,7 @@ SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pix
 /* Returns for each ray the depth of the first transparent surface at or behind `from` (only behind if `beyond` is set),
  * by a search of all of the tile's fragments; +inf if there is none. The search is used only if a ray crosses more
  * transparent surfaces than kernel_hits stores. */
-static vf kernel_next_cut_by_search(const kernel_packet *p, vf from, bool beyond)
+static vf kernel_find_next_cut_in_fragments(const kernel_packet *p, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
     vf_store(start, from);
@@ -88,11 +88,11 @@ static vf kernel_next_cut_by_search(const kernel_packet *p, vf from, bool beyond
 
 /* Returns the depth of the first transparent surface on each ray at or behind t, or only behind t if `beyond` is set;
  * +inf if there is none. */
-SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *list, vf t, bool beyond)
+SIMD_INLINE vf kernel_find_next_cut(const kernel_packet *p, const kernel_segments *list, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
     if (!list->cut) return next;
-    if (vm_any(list->cut->overflowed)) return kernel_next_cut_by_search(p, t, beyond);
+    if (vm_any(list->cut->overflowed)) return kernel_find_next_cut_in_fragments(p, t, beyond);
     for (int i = 0; i < list->cut->cut_count; i++) {
         const vf cut = list->cut->cut[i];
         next = vf_min(vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next), next);
@@ -103,7 +103,7 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *li
 /* ---- a ray's segments ---- */
 
 /* Sorts the full list of the ray in `lane` by t_in. */
-static void kernel_items_sort(kernel_segments *list, int lane)
+static void kernel_sort_segments_of_lane(kernel_segments *list, int lane)
 {
     float(*items)[4] = list->items[lane], (*precise)[4] = list->precise[lane];
     for (int n = 1; n < list->capacity; n++) {
@@ -134,7 +134,7 @@ SIMD_INLINE void kernel_unsorted_light_clear(kernel_light *unsorted_light, int l
 static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane, float t_in)
 {
     const float(*items)[4] = (const float(*)[4])list->items[lane];
-    kernel_items_sort(list, lane);
+    kernel_sort_segments_of_lane(list, lane);
     int count = list->capacity * 3 / 4;
     const float first = items[0][0], last = items[list->capacity - 1][0];
     if (first == last) {
@@ -192,13 +192,13 @@ SIMD_INLINE void kernel_segments_add(kernel_segments *packets, bool is_uniform, 
         const float length = is_double ? run->length[i] : (t_out[i] - t_in[i]) * list->per_t[lane];
         const kernel_unit_segment own = {vf_set(length), vf_set(run->v_in[i]), vf_set(run->v_out[i]),
                                          vf_set(run->rest_in[i]), vf_set(run->rest_out[i])};
-        kernel_integrate(list->pieces, vm_from_bits(1u << lane), &own, &list->unsorted_light);
+        kernel_integrate_segments(list->pieces, vm_from_bits(1u << lane), &own, &list->unsorted_light);
     }
 }
 
 /* Gathers one of the four floats of a segment, for one segment per ray. member: 0 for t_in, 1 for t_out, 2 for v_in, 3
  * for v_out. item: index of the segment's first float in list->items, counted in floats. */
-SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
+SIMD_INLINE vf kernel_gather_segment_member(const kernel_segments *list, int member, vi item)
 {
     return vf_gather(list->items[0][0] + member, item);
 }
@@ -206,10 +206,11 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
 /* Returns those of the rays in `same` on which the segment `item` must come before the segment `earlier`. On the rays
  * in `same` both begin at the same depth. `item` must come first if it ends in front of the end of `earlier`, because
  * its length is then 0 in float32. */
-static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kernel_segments *list, vm same, vi item,
-                                                                      vi earlier)
+static __attribute__((noinline, cold)) vm kernel_segments_compare_equal_begins(const kernel_segments *list, vm same,
+                                                                               vi item, vi earlier)
 {
-    return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
+    return vm_and(same,
+                  vf_lt(kernel_gather_segment_member(list, 1, item), kernel_gather_segment_member(list, 1, earlier)));
 }
 
 /* Sorts the segments of all rays by t_in. Element n of the results belongs to the n-th segment of each ray: the depth
@@ -232,7 +233,7 @@ static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WI
     for (int n = 0; n < row_count; n++) {
         const vm has = vf_lt(vf_set((float)n), count);
         vi item = (vi)vf_select(has, (vf)(firsts + n * FLOATS), (vf)firsts);
-        vf t_in = vf_select(has, kernel_items_gather(list, 0, item), vf_set(INFINITY));
+        vf t_in = vf_select(has, kernel_gather_segment_member(list, 0, item), vf_set(INFINITY));
         int at = n;
         for (; at > 0; at--) {
             const vf before = begins[at - 1];
@@ -241,7 +242,7 @@ static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WI
             if (list->is_double) {
                 const vm same = vm_and(vf_eq(t_in, before), vf_lt(t_in, vf_set(INFINITY)));
                 if (__builtin_expect(vm_any(same), 0))
-                    moves = vm_or(moves, kernel_segments_begin_equal(list, same, item, earlier));
+                    moves = vm_or(moves, kernel_segments_compare_equal_begins(list, same, item, earlier));
             }
             if (!vm_any(moves)) break;
             begins[at] = vf_select(moves, before, t_in);
@@ -263,7 +264,7 @@ enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 #define KERNEL_DARK_DEPTH 18.4f
 
 /* Returns the rounded sum a + b; *lost becomes the rounding error, computed exactly (Knuth). */
-SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
+SIMD_INLINE vf kernel_add_with_rounding_error(vf a, vf b, vf *lost)
 {
     const vf sum = a + b, other = sum - a;
     *lost = (a - (sum - other)) + (b - other);
@@ -272,14 +273,15 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
 
 /* Returns the part of each ray's segment between the positions `from` and `to`, which are shares of the segment's
  * length. */
-SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segment *whole, vf from, vf to)
+SIMD_INLINE kernel_unit_segment kernel_cut_part_of_unit_segment(const kernel_unit_segment *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);
     const vm begins = vf_eq(from, vf_set(0)), ends = vf_eq(to, vf_set(1));
     kernel_unit_segment out = {.length = whole->length * (to - from)};
-    out.v_in =
-        vf_select(begins, whole->v_in, kernel_exact_sum(whole->v_in, rise * from + whole->rest_in, &out.rest_in));
-    out.v_out = vf_select(ends, whole->v_out, kernel_exact_sum(whole->v_in, rise * to + whole->rest_in, &out.rest_out));
+    out.v_in = vf_select(begins, whole->v_in,
+                         kernel_add_with_rounding_error(whole->v_in, rise * from + whole->rest_in, &out.rest_in));
+    out.v_out = vf_select(ends, whole->v_out,
+                          kernel_add_with_rounding_error(whole->v_in, rise * to + whole->rest_in, &out.rest_out));
     out.rest_in = vf_select(begins, whole->rest_in, out.rest_in);
     out.rest_out = vf_select(ends, whole->rest_out, out.rest_out);
     return out;
@@ -287,13 +289,14 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
 
 /* Returns the end of a part of a segment, for segments that are divided into parts so that compositing can mix them.
  * The part begins at `from`; both ends are shares of the segment's length. share: length of a part
- * (kernel_mixed_share()). A part also ends where the opacity has a step. */
-SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
+ * (kernel_choose_share_of_mixed_part()). A part also ends where the opacity has a step. */
+SIMD_INLINE vf kernel_find_end_of_mixed_part(const kernel_pieces *t, const kernel_unit_segment *whole, vf share,
+                                             vf from)
 {
     const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
     vf to = vf_select(vf_lt(from + 1.5f * share, one), from + share, one);
     for (int i = 0; i < t->step_count; i++) {
-        const vf cut = (kernel_rounded_step(t->steps[i]) - whole->v_in) * inverse;
+        const vf cut = (kernel_round_opacity_step(t->steps[i]) - whole->v_in) * inverse;
         to = vf_select(vf_lt(from, cut), vf_min(cut, to), to);
     }
     return to;
@@ -306,13 +309,13 @@ SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_s
  * there, sums to at most 1 over a ray; so d v / 4 may be the whole error that mixing is allowed. Let s be the
  * extinction, c the colour, b the light from behind, R the contrast, and s' and c' the derivatives by the value. Then d
  * v is at most (R |s'| + s |c'|) times the change of the value times the length, and s |c'| is at most the cost
- * (kernel_light_bounds()), which bounds |s c' + s' (c - b)| for all b, among them b = c. */
-SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit_segment *run)
+ * (kernel_look_up_light_error_bounds()), which bounds |s c' + s' (c - b)| for all b, among them b = c. */
+SIMD_INLINE vf kernel_choose_share_of_mixed_part(const kernel_segments *list, const kernel_unit_segment *run)
 {
     const kernel_pieces *t = list->pieces;
     const vf low = vf_min(run->v_in, run->v_out), high = vf_max(run->v_in, run->v_out);
     vf bounds[KERNEL_LIGHT_ENTRIES];
-    kernel_light_bounds(t, low, high, bounds);
+    kernel_look_up_light_error_bounds(t, low, high, bounds);
     const vf most = bounds[KERNEL_LIGHT_STEEPNESS] + bounds[KERNEL_LIGHT_COST];
     const vf moved = (high - low) * most * run->length * 0.25f;
     const vf count = vf_min(-vf_floor(-vf_sqrt(moved / list->mixing)), vf_set(KERNEL_MAX_SUBDIVISIONS));
@@ -320,20 +323,20 @@ SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit
 }
 
 /* Emits one segment per ray as fragments, which compositing mixes with those of other volumes by their optical depths.
- * kernel_integrate() stops once all light but KERNEL_BLACK is absorbed, so that the depth of a very dense fragment
- * would be too small. Therefore such a fragment is bisected until its parts are less dense. Emission ends when no light
- * is left. */
+ * kernel_integrate_segments() stops once all light but KERNEL_BLACK is absorbed, so that the depth of a very dense
+ * fragment would be too small. Therefore such a fragment is bisected until its parts are less dense. Emission ends when
+ * no light is left. */
 static __attribute__((noinline)) void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays,
                                                           vf t_in, vf t_out, const kernel_unit_segment *whole)
 {
-    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_mixed_share(list, whole);
-    vf from = vf_set(0), to = kernel_mixed_part_end(list->pieces, whole, share, from), depth = vf_set(0);
+    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_choose_share_of_mixed_part(list, whole);
+    vf from = vf_set(0), to = kernel_find_end_of_mixed_part(list->pieces, whole, share, from), depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
         kernel_light light = kernel_light_none();
-        const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
+        const kernel_unit_segment run = kernel_cut_part_of_unit_segment(whole, from, to);
         const vf begin = t_in + (t_out - t_in) * from;
         const vf end = vf_select(vf_eq(to, one), t_out, t_in + (t_out - t_in) * to), middle = 0.5f * (from + to);
-        kernel_integrate(list->pieces, open, &run, &light);
+        kernel_integrate_segments(list->pieces, open, &run, &light);
         const vm cut = vm_and(open, vm_and(vf_le(light.transmittance, black),
                                            vm_and(vf_lt(begin, t_in + (t_out - t_in) * middle), vf_lt(middle, to))));
         const vm put = vm_andnot(open, cut);
@@ -344,7 +347,8 @@ static __attribute__((noinline)) void kernel_emit_segment(kernel_packet *p, cons
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);
-        to = vf_select(cut, middle, vf_select(put, kernel_mixed_part_end(list->pieces, whole, share, from), to));
+        to =
+            vf_select(cut, middle, vf_select(put, kernel_find_end_of_mixed_part(list->pieces, whole, share, from), to));
     }
 }
 

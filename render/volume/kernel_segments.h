@@ -48,7 +48,7 @@
 
 /* Returns t_out minus the error bound of the depths at which rays cross faces. An interval whose computed begin is less
  * than this depth certainly begins in front of t_out. render_fold.c uses the same margin. */
-SIMD_INLINE vf kernel_segment_end(vf t_out)
+SIMD_INLINE vf kernel_subtract_crossing_error(vf t_out)
 {
     return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
 }
@@ -56,12 +56,12 @@ SIMD_INLINE vf kernel_segment_end(vf t_out)
 /* Returns the rays whose current fragment must end before the segment from t_in to t_out is added: a surface or a gap
  * lies between, or the segment's cell overlaps the previous one by more than rounding. (Compositing detects overlapping
  * cells by their overlapping fragments, render.h.) */
-SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_segments *list, vf t_in, vf t_out)
+SIMD_INLINE vm kernel_segment_needs_new_fragment(const kernel_packet *p, const kernel_segments *list, vf t_in, vf t_out)
 {
     const vf last = list->blend.t_last;
     vm broken = vm_not(vf_eq(t_in, last));
-    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_segment_end(vf_min(t_out, last)));
-    if (list->cut) broken = vm_or(broken, vf_le(kernel_next_cut(p, list, last, false), t_in));
+    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_subtract_crossing_error(vf_min(t_out, last)));
+    if (list->cut) broken = vm_or(broken, vf_le(kernel_find_next_cut(p, list, last, false), t_in));
     return broken;
 }
 
@@ -71,7 +71,7 @@ SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_segmen
 SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vf end = b->t_last;
-    b->t_last = kernel_segment_end(end);
+    b->t_last = kernel_subtract_crossing_error(end);
     kernel_blend_close(p, b, mask);
     b->t_last = end;
 }
@@ -131,12 +131,12 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
         }
         kernel_light light;
         if (pieces->preintegral) {
-            kernel_preintegrated(pieces, has, &run, &ends[n & 1], &ends[~n & 1], &light);
+            kernel_preint_compute_segment_light(pieces, has, &run, &ends[n & 1], &ends[~n & 1], &light);
         } else {
             light = kernel_light_none();
-            kernel_integrate(pieces, has, &run, &light);
+            kernel_integrate_segments(pieces, has, &run, &light);
         }
-        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, list, t_in, t_out)));
+        kernel_segments_close(p, b, vm_and(has, kernel_segment_needs_new_fragment(p, list, t_in, t_out)));
         if (p->frame->job->reproducible)
             kernel_emit_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
         else

@@ -61,15 +61,15 @@ typedef struct kernel_volume_method {
 
 /* Returns the mask of the tile's blocks that contain pixels of the box. The box is packed as in
  * kernel_tile_candidate.box. */
-SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
+SIMD_INLINE unsigned kernel_get_blocks_of_pixel_box(unsigned box)
 {
     const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
     const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12 & 15) / KERNEL_BLOCK;
-    return kernel_blocks_at((2u << x1) - (1u << x0), (2u << y1) - (1u << y0));
+    return kernel_mask_blocks_in_columns_and_rows((2u << x1) - (1u << x0), (2u << y1) - (1u << y0));
 }
 
 /* Returns the bounding box of the pixels of the blocks in the mask, packed as in kernel_tile_candidate.box. */
-SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
+SIMD_INLINE unsigned kernel_get_pixel_box_of_blocks(unsigned blocks)
 {
     int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
     for (; blocks; blocks &= blocks - 1) {
@@ -86,7 +86,7 @@ SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 /* ---- SIMD_WIDTH tets at once ---- */
 
 /* Converts the values at the tets' vertices to the transfer function's domain, and stores them as transformed->f. */
-SIMD_INLINE void kernel_transformed_set_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
+SIMD_INLINE void kernel_map_tet_values_to_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
@@ -97,10 +97,10 @@ SIMD_INLINE void kernel_transformed_set_domain(kernel_transformed_tets *transfor
 
 /* Returns the lanes whose tets have finite and visible values and end behind the window's begin. near: least depth of
  * each tet. */
-SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
-                                                     const kernel_transformed_tets *transformed,
-                                                     const kernel_visible_values *visible_values,
-                                                     float near[SIMD_WIDTH])
+SIMD_INLINE unsigned kernel_find_visible_transformed_tets(const kernel_tile_trace *t,
+                                                          const kernel_transformed_tets *transformed,
+                                                          const kernel_visible_values *visible_values,
+                                                          float near[SIMD_WIDTH])
 {
     const vf *z = transformed->at[2];
     vf v[4], odd = vf_set(0);
@@ -122,9 +122,9 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
 }
 
 /* Reads the values of tets whose field is constant per cell. */
-static __attribute__((noinline, cold)) void kernel_transformed_set_cell_values(kernel_transformed_tets *transformed,
-                                                                               const kernel_arrays *arrays,
-                                                                               const uint32_t cells[SIMD_WIDTH])
+static __attribute__((noinline, cold)) void kernel_read_cell_values_of_tets(kernel_transformed_tets *transformed,
+                                                                            const kernel_arrays *arrays,
+                                                                            const uint32_t cells[SIMD_WIDTH])
 {
     vi cell;
     memcpy(&cell, cells, sizeof cell);
@@ -147,10 +147,10 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
     for (int n = count; n < SIMD_WIDTH; n++) q->cell[n] = q->cell[0];
     kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count);
-    if (arrays->is_by_cell) kernel_transformed_set_cell_values(&cells->tets, arrays, q->cell);
-    kernel_transformed_set_domain(&cells->tets, transfer);
+    if (arrays->is_by_cell) kernel_read_cell_values_of_tets(&cells->tets, arrays, q->cell);
+    kernel_map_tet_values_to_domain(&cells->tets, transfer);
     unsigned candidates =
-        kernel_transformed_tets_visible(t, &cells->tets, &transfer->visible_values, near) & ((1u << count) - 1);
+        kernel_find_visible_transformed_tets(t, &cells->tets, &transfer->visible_values, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn_lanes(arrays, q->cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
@@ -169,15 +169,15 @@ _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vecto
 
 /* Pairs the transformed tets in the given lanes with rays. blocks, boxes: the blocks and the box of pixels in which
  * each tet may be visible, by lane. Skips tets that lie between the pixels' centres. */
-static void kernel_tet_pairs_begin(const kernel_tile_trace *t, unsigned lanes, const uint16_t *blocks,
-                                   const uint16_t *boxes)
+static void kernel_tet_pairs_list_pairs(const kernel_tile_trace *t, unsigned lanes, const uint16_t *blocks,
+                                        const uint16_t *boxes)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tet_pairs *pairs = &cells->tet_pairs;
     vf places[3][8];
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 4; i++) places[a][i] = cells->tets.at[a][i];
-    kernel_local_pixels(t, 4, (const vf(*)[8])places, cells->pixel_ends);
+    kernel_local_compute_pixel_bounds(t, 4, (const vf(*)[8])places, cells->pixel_ends);
     cells->rays.count = 0;
     pairs->next = 0;
     pairs->large = pairs->left = 0;
@@ -186,12 +186,12 @@ static void kernel_tet_pairs_begin(const kernel_tile_trace *t, unsigned lanes, c
         const int n = __builtin_ctz(lanes);
         unsigned box = boxes[n];
         if (!kernel_local_clip_box(cells->pixel_ends, n, &box)) continue;
-        if (kernel_box_pixels(box) <= KERNEL_TET_PIXELS) {
+        if (kernel_count_pixels_in_box(box) <= KERNEL_TET_PIXELS) {
             kernel_pixel_list_add_box(&cells->rays, box, n);
             continue;
         }
-        pairs->blocks[n] =
-            (uint16_t)(blocks[n] & kernel_box_blocks(box) & kernel_tet_blocks(&cells->block_rays, &cells->tets, n));
+        pairs->blocks[n] = (uint16_t)(blocks[n] & kernel_get_blocks_of_pixel_box(box) &
+                                      kernel_tet_blocks(&cells->block_rays, &cells->tets, n));
         if (pairs->blocks[n]) pairs->large |= 1u << n;
     }
     kernel_pixel_list_pad(&cells->rays);
@@ -227,7 +227,7 @@ SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cell
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
     const unsigned lanes = kernel_tile_transform_tets(t, cells, q, count);
     if (!lanes) return;
-    kernel_tet_pairs_begin(t, lanes, q->blocks, q->box);
+    kernel_tet_pairs_list_pairs(t, lanes, q->blocks, q->box);
     cells->method->process_tets(t);
 }
 
@@ -236,10 +236,10 @@ SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cell
 static __attribute__((noinline, cold)) void kernel_tile_process_single_tet(kernel_tile_trace *t,
                                                                            kernel_tile_cells *cells, unsigned blocks)
 {
-    const uint16_t own_blocks = (uint16_t)blocks, box = (uint16_t)kernel_blocks_box(blocks);
+    const uint16_t own_blocks = (uint16_t)blocks, box = (uint16_t)kernel_get_pixel_box_of_blocks(blocks);
     kernel_transform_single_tet(&cells->tets, &cells->cell, t->frame, &t->tile);
-    kernel_transformed_set_domain(&cells->tets, &t->frame->volumes[cells->volume]);
-    kernel_tet_pairs_begin(t, 1, &own_blocks, &box);
+    kernel_map_tet_values_to_domain(&cells->tets, &t->frame->volumes[cells->volume]);
+    kernel_tet_pairs_list_pairs(t, 1, &own_blocks, &box);
     cells->method->process_tets(t);
 }
 
@@ -257,7 +257,7 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     const unsigned meets = kernel_tile_visible_blocks(t, places, c->count, blocks);
     if (!meets) return 0;
-    kernel_cell_order(c);
+    kernel_cell_sort_vertices(c);
     kernel_cell_map_values_to_domain(c, transfer);
     if (kernel_is_linear(c->type)) return meets;
     if (cells->method->is_pencil) kernel_cell_compute_lines(c, t->frame, &t->tile);
@@ -384,7 +384,7 @@ SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
 
 /* Returns whether cells of this type in the mesh part are queued for processing in vectors. Polyhedra and cells with
  * vertex indices too large for lanes are processed one by one. */
-SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, int type)
+SIMD_INLINE bool kernel_tile_can_queue_type(const kernel_tile_trace *t, int part, int type)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(t->frame->job->parts[part].cells)) return false;
@@ -399,7 +399,7 @@ static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, 
 {
     const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
     kernel_tile_cells *cells = t->thread->tile_cells;
-    if (!kernel_tile_queues_type(t, part, type)) return false;
+    if (!kernel_tile_can_queue_type(t, part, type)) return false;
     if (part != cells->part) {
         kernel_tile_process_queues(t);
         kernel_tile_cells_set_part(t, cells, part);
@@ -421,7 +421,7 @@ static void kernel_process_volume_leaf(kernel_tile_trace *t, int part, const uin
 {
     const grid *g = t->frame->job->parts[part].cells;
     const int volume = t->thread->tile_cells->volume;
-    const unsigned box = kernel_blocks_box(blocks);
+    const unsigned box = kernel_get_pixel_box_of_blocks(blocks);
     uint32_t others[MMBVH_MAX_LEAF];
     int left = 0;
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
@@ -433,7 +433,8 @@ static void kernel_process_volume_leaf(kernel_tile_trace *t, int part, const uin
 
 /* Traverses the trees of the given mesh parts, as a callback of the traversal of the tree over all parts
  * (kernel_tile_visit). Skips nodes whose values are invisible. */
-static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
+static void kernel_traverse_trees_of_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
+                                                  unsigned blocks)
 {
     const int volume = t->thread->tile_cells->volume;
     const render_field *field = &t->frame->job->volumes[volume].field;
@@ -447,13 +448,14 @@ static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t
 }
 
 /* Traverses the trees of all mesh parts, or the tree over the parts if there is one. */
-SIMD_INLINE void kernel_volume_trees(kernel_tile_trace *t, unsigned blocks)
+SIMD_INLINE void kernel_traverse_volume_trees(kernel_tile_trace *t, unsigned blocks)
 {
     const render_job *job = t->frame->job;
     if (job->parent)
-        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_volume_parts);
+        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_traverse_trees_of_volume_parts);
     else
-        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_volume_parts(t, 0, &part, 1, blocks);
+        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
+            kernel_traverse_trees_of_volume_parts(t, 0, &part, 1, blocks);
 }
 
 /* ---- cells found by a search over the whole picture (candidates) ---- */
@@ -559,14 +561,14 @@ SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const k
             const grid *g = job->parts[item->source].cells;
             if (!pass)
                 kernel_prefetch_indices(g, item->cell);
-            else if (!kernel_tile_queues_type(t, (int)item->source, grid_cell_type(g, item->cell)))
+            else if (!kernel_tile_can_queue_type(t, (int)item->source, grid_cell_type(g, item->cell)))
                 kernel_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
         }
     }
 }
 
 /* Processes all candidates of the tile that overlap the window in one of the given blocks. */
-SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
+SIMD_INLINE void kernel_process_volume_candidates(kernel_tile_trace *t, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_cells_select_window(t, cells);
@@ -586,9 +588,9 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
 {
     kernel_tile_cells_begin_volume(t->thread->tile_cells, volume);
     if (t->frame->volume_candidates)
-        kernel_volume_candidates(t, blocks);
+        kernel_process_volume_candidates(t, blocks);
     else
-        kernel_volume_trees(t, blocks);
+        kernel_traverse_volume_trees(t, blocks);
     kernel_tile_process_queues(t);
 }
 
@@ -596,7 +598,7 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
 
 /* Returns the blocks that the bounding box of at least one tree may meet, and the least and greatest depth of these
  * boxes. */
-SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace *t)
+SIMD_INLINE kernel_placement kernel_tile_find_placement_of_trees(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
     kernel_placement all = {.near = INFINITY, .far = -INFINITY};
@@ -617,7 +619,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
     int count = 0;
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
-        kernel_block_begin(t, block);
+        kernel_block_set_up_packets(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = block * KERNEL_BLOCK_PACKETS + n;
             kernel_packet_set_samples(&t->packets[i]);

@@ -40,7 +40,7 @@ SIMD_INLINE void kernel_depth_begin_window(kernel_tile_volume *d)
 }
 
 /* Begins a tile. begin: depth t of its first cell, or +inf if that is not known. */
-SIMD_INLINE void kernel_begin_tile_light_depth(kernel_tile_volume *d, float begin)
+SIMD_INLINE void kernel_depth_begin_tile(kernel_tile_volume *d, float begin)
 {
     if (d->has_met) d->dark = d->own_dark;
     d->has_met = false;
@@ -52,7 +52,7 @@ SIMD_INLINE void kernel_begin_tile_light_depth(kernel_tile_volume *d, float begi
 
 /* Returns the depth (length) of the next window, which begins at the depth `at`: 9/8 of the distance from there to the
  * depth at which the tile is expected to be dark. */
-SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at)
+SIMD_INLINE float kernel_depth_choose_window_length(const kernel_tile_volume *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);

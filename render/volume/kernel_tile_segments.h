@@ -41,7 +41,7 @@
 
 /* Adds the segments of a packet's rays in a polyhedron, between the depths reach[0] and reach[1]: one for each linear
  * piece of the field along a ray, which is piecewise linear in a polyhedron (kernel_polyhedron.h). */
-static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, const polyhedron *c, const vf reach[2])
+static void kernel_add_polyhedron_segments(kernel_tile_trace *t, int packet, const polyhedron *c, const vf reach[2])
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     const kernel_packet *p = &t->packets[packet];
@@ -49,28 +49,29 @@ static void kernel_polyhedron_segments(kernel_tile_trace *t, int packet, const p
     kernel_interval piece;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
     while (kernel_poly_find_next_interval(&r)) {
-        if (!c->is_constant) kernel_poly_prepare_profile(&r);
-        kernel_profile_begin(&r, &piece);
+        if (!c->is_constant) kernel_poly_prepare_piecewise_field(&r);
+        kernel_begin_linear_pieces(&r, &piece);
         for (;;) {
-            piece.mask = kernel_profile_continues(&r, &piece, piece.mask);
+            piece.mask = kernel_has_next_linear_piece(&r, &piece, piece.mask);
             if (!vm_any(piece.mask)) break;
-            kernel_profile_next(&r, r.u_out, &piece);
+            kernel_find_next_linear_piece(&r, r.u_out, &piece);
             const kernel_unit_segment whole =
                 kernel_unit_segment_of((piece.t_out - piece.t_in) * s->packets[packet].per_t, piece.v_in, piece.v_out);
-            kernel_linear_segments(t, s, kernel_packet_places(packet), piece.mask, &piece, reach, &whole);
+            kernel_add_linear_segments(t, s, kernel_list_positions_in_packet(packet), piece.mask, &piece, reach,
+                                       &whole);
         }
     }
 }
 
 /* Adds the segments of a packet's rays in the polyhedron c or, if c is NULL, in the tile's current cell. */
-static void kernel_tile_cell_segments(kernel_tile_trace *t, int packet, const polyhedron *c)
+static void kernel_add_segments_in_cell(kernel_tile_trace *t, int packet, const polyhedron *c)
 {
     const kernel_packet *p = &t->packets[packet];
     const vf reach[2] = {p->t_near, t->thread->tile_segments->packets[packet].t_cut};
     if (c)
-        kernel_polyhedron_segments(t, packet, c, reach);
+        kernel_add_polyhedron_segments(t, packet, c, reach);
     else
-        kernel_curved_segments(t, packet, p->active, reach, 1, -1);
+        kernel_add_segments_in_current_cell(t, packet, p->active, reach, 1, -1);
 }
 
 /* ---- tets ---- */
@@ -85,14 +86,14 @@ static __attribute__((noinline)) void kernel_tet_segments_refine(const kernel_ti
         u[half] = vd_gather((const float *)(const void *)s->u, 2 * places, half);
         v[half] = vd_gather((const float *)(const void *)s->v, 2 * places, half);
     }
-    kernel_double_segments(s->faces, lanes, first, second, u, v, run);
+    kernel_refine_segments_in_double(s->faces, lanes, first, second, u, v, run);
     run->length *= vf_gather(s->per_t, places);
 }
 
 /* Adds the segments of a vector of rays in their tets. is_uniform: set if the rays are those of one packet and share
  * one tet, the current packet and lane of kernel_tet_pairs. */
-SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *s, kernel_lane_rays *r,
-                                           bool is_uniform)
+SIMD_INLINE void kernel_add_segments_of_tet_pairs(kernel_tile_trace *t, kernel_tile_segments *s, kernel_lane_rays *r,
+                                                  bool is_uniform)
 {
     const kernel_tet_pairs *pairs = &t->thread->tile_cells->tet_pairs;
     kernel_segments *lists = is_uniform ? &s->packets[pairs->packet] : s->packets;
@@ -105,7 +106,8 @@ SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_seg
     else
         vf_gather_pair(s->window, 2 * places, &begin, &end);
     r->active = vm_and(r->active, vf_lt(begin, end));
-    kernel_tet_rays_cross(&t->thread->tile_cells->tets, r, is_uniform, pairs->lane, false, false, hit, &i);
+    kernel_tet_rays_find_intervals_and_faces(&t->thread->tile_cells->tets, r, is_uniform, pairs->lane, false, false,
+                                             hit, &i);
     if (!vm_any(i.mask)) return;
     if (is_uniform)
         near = t->packets[pairs->packet].t_near, far = lists->t_cut;
@@ -113,7 +115,7 @@ SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_seg
         vf_gather_pair(s->reach, 2 * places, &near, &far);
     const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
     vm cut = vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out));
-    if (s->has_cuts) cut = vm_or(cut, vf_lt(kernel_local_next_cut(t, s, places, met, i.t_in), i.t_out));
+    if (s->has_cuts) cut = vm_or(cut, vf_lt(kernel_local_find_next_cut(t, s, places, met, i.t_in), i.t_out));
     cut = vm_and(met, cut);
     const vm own = vm_and(vm_andnot(met, cut), vf_le(begin, i.t_in));
     if (!vm_any(vm_or(own, cut))) return;
@@ -124,30 +126,31 @@ SIMD_INLINE void kernel_tet_segments_lanes(kernel_tile_trace *t, kernel_tile_seg
      * although both depths are the same float32 */
     kernel_segments_add(lists, is_uniform, s->is_double, places, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in,
                         i.t_out, &run);
-    if (__builtin_expect(vm_any(cut), 0)) kernel_linear_segments(t, s, places, cut, &i, (const vf[2]){near, far}, &run);
+    if (__builtin_expect(vm_any(cut), 0))
+        kernel_add_linear_segments(t, s, places, cut, &i, (const vf[2]){near, far}, &run);
 }
 
 /* Adds the segments in the current vector of tets. */
-static __attribute__((noinline)) void kernel_tet_segments(kernel_tile_trace *t)
+static __attribute__((noinline)) void kernel_add_tet_segments(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     kernel_lane_rays r;
     if (s->is_double)
-        kernel_double_compute_faces(t->frame, &t->tile, &t->thread->tile_cells->tets, &t->frame->volumes[s->volume],
-                                    s->faces);
+        kernel_double_compute_tet_functions(t->frame, &t->tile, &t->thread->tile_cells->tets,
+                                            &t->frame->volumes[s->volume], s->faces);
     while (kernel_tet_pairs_next(t, &r)) {
         if (t->thread->tile_cells->tet_pairs.packet < 0)
-            kernel_tet_segments_lanes(t, s, &r, false);
+            kernel_add_segments_of_tet_pairs(t, s, &r, false);
         else
-            kernel_tet_segments_lanes(t, s, &r, true);
+            kernel_add_segments_of_tet_pairs(t, s, &r, true);
     }
-    kernel_blocks_shorten(t, s->blocks);
+    kernel_update_shortened_windows(t, s->blocks);
 }
 
 static const kernel_volume_method kernel_volume_by_segments = {
     .is_pencil = false,
-    .process_packet = kernel_tile_cell_segments,
-    .process_tets = kernel_tet_segments,
+    .process_packet = kernel_add_segments_in_cell,
+    .process_tets = kernel_add_tet_segments,
     .transform = kernel_local_segments_transform,
     .process_pixels = kernel_local_segments_process_pixels,
     .finish = kernel_local_segments_finish,
@@ -185,8 +188,8 @@ SIMD_INLINE void kernel_ray_segments_begin_volume(kernel_packet *p, kernel_segme
 
 /* Deactivates rays that have ended or are dark (have less light left than KERNEL_DARK). Returns the least depth at
  * which the window of a ray that is still active begins; +inf if no ray is active. */
-SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
-                                             int count)
+SIMD_INLINE float kernel_tile_find_next_window_begin(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
+                                                     int count)
 {
     vf front = vf_set(INFINITY);
     for (int n = 0; n < count; n++) {
@@ -235,13 +238,14 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
 
 /* Integrates a volume's segments, window by window. packets: indices of the `count` packets; reach: the depths and
  * blocks in which there are cells. */
-SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
-                                              int count, int volume, const kernel_placement *reach)
+SIMD_INLINE void kernel_tile_integrate_volume_segments(kernel_tile_trace *t, kernel_tile_segments *s,
+                                                       const int *packets, int count, int volume,
+                                                       const kernel_placement *reach)
 {
     for (int n = 0; n < count; n++)
         kernel_ray_segments_begin_volume(&t->packets[packets[n]], &s->packets[packets[n]], volume);
     for (;;) {
-        const float front = kernel_tile_segments_front(t, s, packets, count);
+        const float front = kernel_tile_find_next_window_begin(t, s, packets, count);
         if (!(front < INFINITY)) break;
         t->t_near = fmaxf(front, reach->near);
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
@@ -257,11 +261,11 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 
 /* Traces the tile's volumes after its opaque surfaces, whose hits are in the packets. Transparent surfaces, whose hits
  * are fragments, cut segments. */
-static void kernel_tile_segments_trace(kernel_tile_trace *t)
+static void kernel_tile_integrate_volumes(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, true)) return;
-    const kernel_placement reach = kernel_tile_trees_placement(t);
+    const kernel_placement reach = kernel_tile_find_placement_of_trees(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     s->has_overflowed = false;
@@ -269,11 +273,11 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
         const int i = packets[n];
         kernel_ray_segments_begin(&t->packets[i], &s->packets[i], reach.far, &t->hits[i]);
         if (s->packets[i].is_double)
-            kernel_double_rays_of(&t->packets[i], s->u + i * SIMD_WIDTH, s->v + i * SIMD_WIDTH);
+            kernel_get_ray_parameters_in_double(&t->packets[i], s->u + i * SIMD_WIDTH, s->v + i * SIMD_WIDTH);
         s->has_overflowed = s->has_overflowed || vm_any(t->hits[i].overflowed);
     }
     for (int volume = 0; volume < t->frame->volume_count; volume++)
-        kernel_tile_segments_windows(t, s, packets, count, volume, &reach);
+        kernel_tile_integrate_volume_segments(t, s, packets, count, volume, &reach);
     for (int n = 0; n < count; n++) {
         kernel_segments *list = &s->packets[packets[n]];
         t->packets[packets[n]].active = list->active;

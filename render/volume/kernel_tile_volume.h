@@ -37,31 +37,31 @@
 
 /* Sets the values of the window's samples that lie in the current interval of the rays in a polyhedron, on which the
  * field is piecewise linear: the ray's profile (kernel_polyhedron.h). */
-static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
+static void kernel_sample_polyhedron_interval(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
 {
     const kernel_interval *i = &r->interval;
     kernel_interval piece;
     int begin, end;
-    kernel_sample_range(p, s, i, &begin, &end);
+    kernel_find_samples_in_interval(p, s, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_poly_prepare_profile(r);
-    kernel_profile_begin(r, &piece);
-    while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
-        kernel_profile_next(r, r->u_out, &piece);
+    if (!r->cell->is_constant) kernel_poly_prepare_piecewise_field(r);
+    kernel_begin_linear_pieces(r, &piece);
+    while (vm_any(kernel_has_next_linear_piece(r, &piece, i->mask))) {
+        kernel_find_next_linear_piece(r, r->u_out, &piece);
         kernel_fill_interval_samples(p, s, NULL, &piece, i);
     }
 }
 
 /* Sets the values of the samples of a packet's rays in the polyhedron c or, if c is NULL, in the tile's current cell.
  */
-static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedron *c)
+static void kernel_sample_polyhedron_or_cell(kernel_tile_trace *t, int packet, const polyhedron *c)
 {
     kernel_packet *p = &t->packets[packet];
     kernel_poly_crossings r;
-    if (!c) kernel_curved_samples(t, packet, p->active, 0, KERNEL_MAX_GROUP);
+    if (!c) kernel_sample_current_cell(t, packet, p->active, 0, KERNEL_MAX_GROUP);
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, p->active, false)) return;
     while (kernel_poly_find_next_interval(&r))
-        kernel_polyhedron_interval_fill(p, &t->thread->tile_volume->packets[packet], &r);
+        kernel_sample_polyhedron_interval(p, &t->thread->tile_volume->packets[packet], &r);
 }
 
 /* ---- tets: pairs from the list and whole packets give bit-identical samples ---- */
@@ -69,8 +69,9 @@ static void kernel_tile_samples(kernel_tile_trace *t, int packet, const polyhedr
 /* Emits samples as fragments of their own: those that also lie in another cell or, with separate_samples (render.h),
  * all samples. lanes: mask of the lanes that hold such a sample; places: position of each ray among the tile's packets;
  * t_in, t_out: the rays' intervals in their tets; depth, value: of the samples. */
-static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_tile_trace *t, unsigned lanes, vi places,
-                                                                        vf t_in, vf t_out, vf depth, vf value)
+static __attribute__((noinline, cold)) void kernel_emit_tet_samples_separately(kernel_tile_trace *t, unsigned lanes,
+                                                                               vi places, vf t_in, vf t_out, vf depth,
+                                                                               vf value)
 {
     int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
@@ -84,11 +85,12 @@ static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_t
 
 /* Sets the values of the window's samples that lie in the rays' intervals i in their tets. at: position of each ray
  * among the tile's packets. */
-SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volume *b, const kernel_interval *i, vi at)
+SIMD_INLINE void kernel_sample_tet_intervals(kernel_tile_trace *t, kernel_tile_volume *b, const kernel_interval *i,
+                                             vi at)
 {
     vf base, step, number, last;
     vf_gather_pair(b->steps, 2 * at, &base, &step);
-    kernel_local_sample_range(b, base, step, i->t_in, i->t_out, &number, &last);
+    kernel_local_find_sample_range(b, base, step, i->t_in, i->t_out, &number, &last);
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     for (vm more = vm_and(i->mask, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
@@ -96,14 +98,16 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volum
         const vf depth = base + step * vf_from_vi(whole + b->first), value = i->v_in + slope * (depth - i->t_in);
         const vm own = vm_and(more, vm_andnot(vf_lt(depth, i->t_out), vf_lt(depth, i->t_in)));
         const unsigned taken = kernel_local_store_samples(b, own, at, whole, value);
-        if (t->frame->needs_contact) kernel_local_store_contact(b, vm_bits(own) & ~taken, at, whole, i->t_in, i->t_out);
-        if (__builtin_expect(taken, 0)) kernel_tet_samples_separate(t, taken, at, i->t_in, i->t_out, depth, value);
+        if (t->frame->needs_contact)
+            kernel_local_store_cell_interval_ends(b, vm_bits(own) & ~taken, at, whole, i->t_in, i->t_out);
+        if (__builtin_expect(taken, 0))
+            kernel_emit_tet_samples_separately(t, taken, at, i->t_in, i->t_out, depth, value);
         number += 1.0f;
     }
 }
 
 /* Computes the samples in the current vector of tets. */
-static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
+static __attribute__((noinline)) void kernel_sample_tets(kernel_tile_trace *t)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
     const kernel_tile_cells *cells = t->thread->tile_cells;
@@ -114,7 +118,7 @@ static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
         if (packet < 0) {
             r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, r.at)));
             kernel_tet_rays_interval(&cells->tets, &r, false, &i);
-            if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, r.at);
+            if (vm_any(i.mask)) kernel_sample_tet_intervals(t, b, &i, r.at);
         } else if (vm_any(r.active)) {
             kernel_tet_rays_interval_in_one(&cells->tets, &r, cells->tet_pairs.lane, true, false, &i);
             if (!vm_any(i.mask)) continue;
@@ -128,8 +132,8 @@ static __attribute__((noinline)) void kernel_tet_samples(kernel_tile_trace *t)
 
 static const kernel_volume_method kernel_volume_by_samples = {
     .is_pencil = true,
-    .process_packet = kernel_tile_samples,
-    .process_tets = kernel_tet_samples,
+    .process_packet = kernel_sample_polyhedron_or_cell,
+    .process_tets = kernel_sample_tets,
     .transform = kernel_local_transform_lanes,
     .process_pixels = kernel_local_queue_samples,
     .finish = kernel_local_compute_samples,
@@ -157,7 +161,8 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, f
  * active. Lowers *near to the least depth of these samples. */
 SIMD_INLINE float kernel_ray_samples_begin_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
 {
-    const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
+    const vf t_first = kernel_get_sample_depth(p, s->first),
+             t_last = kernel_get_sample_depth(p, s->first + s->count - 1);
     const vf t_end = vf_min(t_last, p->t_far);
     const vf nothing = vf_set(p->frame->job->separate_samples ? 0 : NAN);
     p->active = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), s->blend.light), vf_le(t_first, t_end)));
@@ -180,7 +185,7 @@ SIMD_INLINE bool kernel_tile_sample_window(kernel_tile_trace *t, kernel_tile_vol
         float far = -INFINITY;
         for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
             const int i = b * KERNEL_BLOCK_PACKETS + n;
-            kernel_samples_window(&t->packets[i], &v->packets[i], first, last - first + 1);
+            kernel_samples_set_window(&t->packets[i], &v->packets[i], first, last - first + 1);
             far = simd_max(
                 kernel_ray_samples_begin_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
         }
@@ -196,12 +201,13 @@ SIMD_INLINE bool kernel_tile_sample_window(kernel_tile_trace *t, kernel_tile_vol
 }
 
 /* Chooses the number of samples in the window that begins with sample number `first`: as many as are expected to
- * receive light (kernel_depth_next_window()), at most job->sample_group. */
-SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const kernel_packet *p, int first)
+ * receive light (kernel_depth_choose_window_length()), at most job->sample_group. */
+SIMD_INLINE int kernel_tile_choose_window_sample_count(const kernel_tile_volume *v, const kernel_packet *p, int first)
 {
     enum { LEAST = 8 };
     const int most = p->frame->job->sample_group, least = most < LEAST ? most : LEAST;
-    const float wanted = kernel_depth_next_window(v, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
+    const float wanted =
+        kernel_depth_choose_window_length(v, kernel_get_sample_depth(p, first)[0]) * p->sample_inverse[0];
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 
@@ -220,15 +226,15 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 }
 
 /* Traces the tile's volumes after its opaque surfaces, whose hits are in the packets. */
-static void kernel_tile_volumes(kernel_tile_trace *t)
+static void kernel_tile_sample_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
     /* Hexes, wedges and pyramids are sampled one sample per lane, except in two cases: if the frame has surfaces, which
-     * may end rays, and because of which kernel_blend_breaks() needs the ends of intervals in cells; and if each sample
-     * becomes a fragment of its own. */
+     * may end rays, and because of which kernel_blend_must_end_before_sample() needs the ends of intervals in cells;
+     * and if each sample becomes a fragment of its own. */
     const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes)) return;
-    kernel_placement reach = kernel_tile_trees_placement(t);
+    kernel_placement reach = kernel_tile_find_placement_of_trees(t);
     const unsigned blocks = reach.blocks;
     /* depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees */
     const float cells_near = t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
@@ -238,9 +244,9 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);
-    kernel_begin_tile_light_depth(v, cells_near);
+    kernel_depth_begin_tile(v, cells_near);
     for (int from = first, to; from <= last; from = to) {
-        const int samples = kernel_tile_window_samples(v, &t->packets[packets[0]], from);
+        const int samples = kernel_tile_choose_window_sample_count(v, &t->packets[packets[0]], from);
         to = last - from < samples ? last + 1 : from + samples;
         if (!kernel_tile_sample_window(t, v, blocks, from, to - 1)) break;
         if (!t->frame->job->separate_samples) kernel_tile_window_blend(t, v, packets, count, to - from);

@@ -47,7 +47,7 @@ static double colour_at(const render_transfer *t, double place, int channel)
 
 /* Returns whether the table's entries between `from` and `to` lie on the line between these two, within the tolerance.
  */
-static bool is_straight(const render_transfer *t, int from, int to, double tolerance)
+static bool are_colours_on_line(const render_transfer *t, int from, int to, double tolerance)
 {
     for (int c = 0; c < 3; c++) {
         const double start = (double)t->colours[3 * from + c];
@@ -60,12 +60,12 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
 
 /* Returns the index of the farthest entry behind entry i up to which all entries lie on a line within the tolerance.
  * The search takes quadratic time, so lines are limited to FARTHEST entries. */
-static int next_entry(const render_transfer *t, int i, double tolerance)
+static int find_farthest_entry_on_line(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
     int next = i + 1;
     if (t->scale != RENDER_LINEAR) return next;
-    while (next + 1 < t->colour_count && next - i < FARTHEST && is_straight(t, i, next + 1, tolerance)) next++;
+    while (next + 1 < t->colour_count && next - i < FARTHEST && are_colours_on_line(t, i, next + 1, tolerance)) next++;
     return next;
 }
 
@@ -100,7 +100,7 @@ static double ramp_value(const render_transfer *t, int ramp, double share)
 /* Returns whether the relative error of the extinction exceeds the tolerance if the part of the ramp becomes one piece.
  * The relative error is largest at an end of the part with opacity 0, but the tested position nearest to that end is
  * 1/32 of the part away from it; the factor 1.1 covers the difference. */
-static bool is_bent(const render_transfer *t, int ramp, double low, double high, double tolerance)
+static bool is_ramp_part_nonlinear(const render_transfer *t, int ramp, double low, double high, double tolerance)
 {
     enum { PLACES = 32 };
     const double x0 = ramp_value(t, ramp, low), x1 = ramp_value(t, ramp, high);
@@ -122,7 +122,7 @@ static int find_ramp_cuts(const render_transfer *t, int ramp, double low, double
     const double middle = 0.5 * (low + high), at = ramp_value(t, ramp, middle);
     const float rounded = (float)at;
     if (!((float)ramp_value(t, ramp, low) < rounded && rounded < (float)ramp_value(t, ramp, high))) return 0;
-    if (!is_bent(t, ramp, low, high, tolerance)) return 0;
+    if (!is_ramp_part_nonlinear(t, ramp, low, high, tolerance)) return 0;
     int count = find_ramp_cuts(t, ramp, low, middle, tolerance, cuts);
     if (cuts) cuts[count] = (kernel_real)at;
     count++;
@@ -130,7 +130,7 @@ static int find_ramp_cuts(const render_transfer *t, int ramp, double low, double
 }
 
 /* Stores the values at which all ramps must be cut, unless cuts is NULL. Returns their number. */
-static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cuts)
+static int find_cuts_of_all_ramps(const render_transfer *t, double tolerance, kernel_real *cuts)
 {
     const double share = tolerance > rounding ? tolerance : exact_share;
     int count = 0;
@@ -147,8 +147,8 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
  * the colour table among them. Returns the number of cuts. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
-    int count = cut_ramps(t, tolerance, cuts), kept = 0;
-    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
+    int count = find_cuts_of_all_ramps(t, tolerance, cuts), kept = 0;
+    for (int i = 0; i < t->colour_count - 1; i = find_farthest_entry_on_line(t, i, tolerance))
         entries[kept++] = (kept_entry){i, render_entry_position(t, i)};
     entries[kept++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
     for (int i = 0; i < kept; i++) cuts[count++] = (kernel_real)entries[i].place;
@@ -162,7 +162,7 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
 
 /* Returns the position of the value x (in the domain) on the ramp from opacity point i to the next one, along the
  * scale, as a share from 0 to 1. */
-static double ramp_share(const render_transfer *t, int i, double x)
+static double get_position_on_ramp(const render_transfer *t, int i, double x)
 {
     double low, inverse_width;
     render_transfer_domain(t, &low, &inverse_width);
@@ -173,14 +173,14 @@ static double ramp_share(const render_transfer *t, int i, double x)
 }
 
 /* Returns the opacity at the value x on the ramp that contains the value `middle`; values in the domain. */
-static double opacity_on(const render_transfer *t, double middle, double x)
+static double get_opacity_on_ramp(const render_transfer *t, double middle, double x)
 {
     int i = 0;
     while (i < t->opacity_count && render_domain_of(t, t->opacity_values[i]) <= middle) i++;
     if (i == 0) return (double)t->opacities[0];
     if (i == t->opacity_count) return (double)t->opacities[i - 1];
     const double rise = (double)t->opacities[i] - (double)t->opacities[i - 1];
-    const double a = (double)t->opacities[i - 1] + ramp_share(t, i - 1, x) * rise;
+    const double a = (double)t->opacities[i - 1] + get_position_on_ramp(t, i - 1, x) * rise;
     return a < 0 ? 0 : a > 1 ? 1 : a;
 }
 
@@ -206,7 +206,7 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
  * (3e-8) becomes visible. */
 static const double narrow_width = 0.01;
 
-static bool is_narrow(const render_transfer *t, int i)
+static bool is_ramp_narrow(const render_transfer *t, int i)
 {
     const double width = render_domain_of(t, t->opacity_values[i + 1]) - render_domain_of(t, t->opacity_values[i]);
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
@@ -222,7 +222,7 @@ static double exact_cut_value(const render_transfer *t, kernel_real cut)
         const double at = render_domain_of(t, t->opacity_values[i]);
         if ((kernel_real)at != cut) continue;
         count++;
-        if ((i > 0 && is_narrow(t, i - 1)) || (i + 1 < t->opacity_count && is_narrow(t, i))) out = at;
+        if ((i > 0 && is_ramp_narrow(t, i - 1)) || (i + 1 < t->opacity_count && is_ramp_narrow(t, i))) out = at;
     }
     return count == 1 ? out : (double)cut;
 }
@@ -236,7 +236,7 @@ static void set_piece(const render_transfer *t, const kept_entry *entries, kerne
     piece[KERNEL_PIECE_HIGH] = high;
     piece[KERNEL_PIECE_LOW_REST] = (kernel_real)(begin - (double)low);
     piece[KERNEL_PIECE_HIGH_REST] = (kernel_real)(end - (double)high);
-    const double at_low = opacity_on(t, middle, begin), at_high = opacity_on(t, middle, end);
+    const double at_low = get_opacity_on_ramp(t, middle, begin), at_high = get_opacity_on_ramp(t, middle, end);
     piece[KERNEL_PIECE_OPACITY] = (kernel_real)at_low;
     piece[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)at_high;
     piece[KERNEL_PIECE_CLEAR] = (kernel_real)(1 - at_low);
@@ -275,7 +275,7 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
 }
 
 /* Computes the range of all colours of the table, extended to include 0 and 1. */
-static void range_of_light(const render_transfer *t, float *low, float *high)
+static void find_colour_range(const render_transfer *t, float *low, float *high)
 {
     *low = 0, *high = 1;
     for (int i = 0; i < 3 * t->colour_count; i++) {
@@ -288,9 +288,9 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
  *
  * A field error d changes the light by T d g per unit distance, where T is the transmittance, s the extinction, c a
  * channel of the colour, primes are derivatives by the value, and g = s' (c - b) + s c'. The light b from behind lies
- * in the range of light (range_of_light()). g is linear in b, so that over a range of values its variation is largest
- * if b is the minimum or the maximum. For the alpha channel, g = s'. So there are seven kinds of g: alpha, and three
- * channels with two b each. */
+ * in the range of light (find_colour_range()). g is linear in b, so that over a range of values its variation is
+ * largest if b is the minimum or the maximum. For the alpha channel, g = s'. So there are seven kinds of g: alpha, and
+ * three channels with two b each. */
 enum { VARIATION_KINDS = 7 };
 
 /* Over a range of values: the minimum and maximum of each kind of g (VARIATION_KINDS), and the maximum of the
@@ -320,14 +320,14 @@ static void unite_variations(value_variation *a, const value_variation *b)
 /* Widens the ranges of g (the change of light per unit of field error, defined above) and of the extinction so that
  * they include those between the values `from` and `to` of the piece p. behind: the minimum and maximum of the light
  * from behind. */
-static void variation_in_piece(value_variation *variation, const kernel_real *p, double from, double to,
-                               const double behind[2])
+static void include_variation_of_piece(value_variation *variation, const kernel_real *p, double from, double to,
+                                       const double behind[2])
 {
     kernel_bound b = {.extinction_low = 1e30f};
     const bool falls = p[KERNEL_PIECE_SLOPE] < 0;
     double steepness[2];
     kernel_bound_widen(&b, p, from, to);
-    kernel_piece_steepness(p, from, to, steepness);
+    kernel_bound_piece_extinction_slope(p, from, to, steepness);
     /* Minimum and maximum of the slope of the extinction, with its sign. */
     const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
@@ -350,8 +350,8 @@ static void variation_in_piece(value_variation *variation, const kernel_real *p,
  * bin of values, and a little beyond its ends; the first and the last bin include all values beyond the table. piece:
  * index of a piece, in front of which no piece reaches the bin. Returns the index of the first piece that reaches the
  * bin, from which the search for the next bin's pieces begins. */
-static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
-                            value_variation *variation)
+static int compute_variation_of_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
+                                    value_variation *variation)
 {
     const double width = 1 / (double)t->variation_inverse, begin = (double)t->bin_low + (bin - 1e-3) * width;
     const double low = bin > 0 ? begin : -(double)endless;
@@ -363,14 +363,15 @@ static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const do
     for (int i = piece; i < t->count && (double)t->pieces[i][KERNEL_PIECE_LOW] <= high; i++) {
         const double from = fmax(low, (double)t->pieces[i][KERNEL_PIECE_LOW]);
         const double to = fmin(high, (double)t->pieces[i][KERNEL_PIECE_HIGH]);
-        variation_in_piece(variation, t->pieces[i], from, to, behind);
+        include_variation_of_piece(variation, t->pieces[i], from, to, behind);
     }
     return piece;
 }
 
 /* Computes the bounds over a range of values (KERNEL_LIGHT_VARIATION etc.), for the table of bounds, from the ranges of
  * g and of the extinction over these values. */
-static void sum_up_variation(const value_variation *s, double contrast, float out[KERNEL_LIGHT_ENTRIES])
+static void compute_light_bounds_from_variation(const value_variation *s, double contrast,
+                                                float out[KERNEL_LIGHT_ENTRIES])
 {
     double variation = 0, cost = 0;
     for (int kind = 0; kind < VARIATION_KINDS; kind++) {
@@ -390,13 +391,14 @@ static void fill_variations(kernel_pieces *out, const double behind[2])
 {
     value_variation bins[KERNEL_VARIATION_BINS];
     for (int i = 0, piece = 0; i < KERNEL_VARIATION_BINS; i++)
-        piece = variation_in_bin(out, i, piece, behind, &bins[i]);
+        piece = compute_variation_of_bin(out, i, piece, behind, &bins[i]);
     for (int first = 0; first < KERNEL_VARIATION_BINS; first++) {
         value_variation all = bins[first];
         for (int width = 0, last = first; width < KERNEL_VARIATION_WIDTHS; width++) {
             const int wanted = first + (int)ceil(ldexp(1 + 0.25 * (width % 4 + 1), width / 4)) - 1;
             for (; last < wanted && last + 1 < KERNEL_VARIATION_BINS; last++) unite_variations(&all, &bins[last + 1]);
-            sum_up_variation(&all, behind[1] - behind[0], out->variations[width * KERNEL_VARIATION_BINS + first]);
+            compute_light_bounds_from_variation(&all, behind[1] - behind[0],
+                                                out->variations[width * KERNEL_VARIATION_BINS + first]);
         }
     }
 }
@@ -412,15 +414,15 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
     fill_bins(out);
-    range_of_light(t, &low, &high);
+    find_colour_range(t, &low, &high);
     out->contrast = high - low;
     fill_steps(out, t);
-    for (int i = 0; i + 1 < t->opacity_count; i++) out->has_rests = out->has_rests || is_narrow(t, i);
+    for (int i = 0; i + 1 < t->opacity_count; i++) out->has_rests = out->has_rests || is_ramp_narrow(t, i);
 }
 
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)
 {
-    const size_t bends = (size_t)cut_ramps(t, tolerance, NULL);
+    const size_t bends = (size_t)find_cuts_of_all_ramps(t, tolerance, NULL);
     const size_t most = (size_t)t->colour_count + (size_t)t->opacity_count + bends;
     memset(out, 0, sizeof *out);
     kernel_real *cuts = base_calloc(most, sizeof *cuts);
@@ -438,7 +440,7 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
 insitu_status render_variations_build(kernel_pieces *pieces, const render_transfer *t, base_error *error)
 {
     float low, high;
-    range_of_light(t, &low, &high);
+    find_colour_range(t, &low, &high);
     pieces->variations = base_calloc(KERNEL_VARIATION_WIDTHS * KERNEL_VARIATION_BINS, sizeof *pieces->variations);
     if (!pieces->variations)
         return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the bounds of a transfer function");

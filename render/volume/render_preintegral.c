@@ -23,7 +23,7 @@ static const double absorbed_share = 0.15, length_share = 0.05;
  * by more than some distance are looked up in the table. This distance grows with the square of a bin's width and falls
  * with the allowed error, so that narrower bins let more segments be looked up. At 1e-2 the table has 196 KB, so that
  * it fits into a core's second-level cache beside a tile's rays. */
-static int bin_count_for(double max_error)
+static int choose_bin_count(double max_error)
 {
     int count = LEAST_BINS;
     while (count < MOST_BINS && count < 400 / sqrt(max_error)) count *= 2;
@@ -48,7 +48,7 @@ static double within(double x, double low, double high)
 }
 
 /* Returns 1 - opacity at the value x in the piece p. */
-static double clear_at(const kernel_real *p, double x)
+static double get_transparency_at(const kernel_real *p, double x)
 {
     const double along = (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_INVERSE);
     const double low = entry_of(p, KERNEL_PIECE_CLEAR), high = entry_of(p, KERNEL_PIECE_CLEAR_HIGH);
@@ -72,7 +72,7 @@ static double extinction_of(double clear)
 
 static double extinction_at(const kernel_real *p, double x)
 {
-    return extinction_of(clear_at(p, x));
+    return extinction_of(get_transparency_at(p, x));
 }
 
 /* Returns the extinction for `clear`, which is 1 - opacity. last: the previous argument and result, kept because
@@ -99,7 +99,7 @@ static void integrate(const kernel_real *p, double from, double to, int depth, d
 {
     static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
     static const double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-    const double a = clear_at(p, from), b = clear_at(p, to), middle = 0.5 * (from + to);
+    const double a = get_transparency_at(p, from), b = get_transparency_at(p, to), middle = 0.5 * (from + to);
     if (depth < 40 && fabs(a - b) > 0.25 * greater(a, b)) {
         integrate(p, from, middle, depth + 1, last, sum);
         integrate(p, middle, to, depth + 1, last, sum);
@@ -116,7 +116,7 @@ static void integrate(const kernel_real *p, double from, double to, int depth, d
 /* Widens the bin's ranges of extinction and colour so that they include those at the value x of the piece p. */
 static void widen(bin_sums *bin, const kernel_real *p, double x, double last[2])
 {
-    const double extinction = get_cached_extinction(last, clear_at(p, x));
+    const double extinction = get_cached_extinction(last, get_transparency_at(p, x));
     bin->low = lesser(extinction, bin->low);
     bin->high = greater(extinction, bin->high);
     for (int c = 0; c < 3; c++) {
@@ -226,7 +226,7 @@ static double store_bin_integrals(kernel_preintegral *out, const bin_sums *bins,
  * colour tables whose entries are unevenly spaced in the domain. The limits hold even if the largest change of slope
  * occurred at entries with the smallest spacing. The changes of slope towards the constant colours beyond the ends
  * count too, because the ends need not be at 0 and 1. */
-static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
+static void compute_uneven_colour_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
     for (int c = 0; c < 3; c++) {
@@ -246,11 +246,11 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 
 /* Computes the members of *out that limit the deviation of colours from chords (kernel_preintegral.h), from the changes
  * of the colours' slopes at the table's entries. */
-static void fill_bends(kernel_preintegral *out, const render_transfer *t)
+static void compute_colour_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
     if (t->scale != RENDER_LINEAR) {
-        fill_uneven_bends(out, t);
+        compute_uneven_colour_bends(out, t);
         return;
     }
     double inner = 0, ends = 0;
@@ -283,7 +283,7 @@ static void fill(kernel_preintegral *out, const kernel_pieces *exact, const rend
     out->inverse = (float)(1 / width);
     fill_bins(exact, low, width, out->bin_count, bins);
     const double change = store_bin_integrals(out, bins, width, contrast);
-    fill_bends(out, t);
+    compute_colour_bends(out, t);
     out->contrast = (float)contrast;
     out->colour_unit = (float)(contrast / COLOUR_LEVELS);
     out->colour_error = (float)(change + contrast / COLOUR_LEVELS);
@@ -300,7 +300,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
-    const int count = bin_count_for(max_error);
+    const int count = choose_bin_count(max_error);
     bin_sums *bins = base_calloc((size_t)count + 2, sizeof *bins);
     pieces->preintegral = base_calloc(1, sizeof *pieces->preintegral);
     if (pieces->preintegral) {

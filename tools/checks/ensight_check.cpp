@@ -54,7 +54,7 @@ bool starts_with(const std::string &text, const char *start)
 
 /* Returns the number of nodes of an element type: -1 for an unknown type, 0 if elements of the type have different
  * numbers of nodes. */
-int nodes_of_type(const std::string &type)
+int count_nodes_of_element_type(const std::string &type)
 {
     static const std::map<std::string, int> nodes = {
         {"point", 1}, {"bar2", 2},       {"bar3", 3},     {"tria3", 3},  {"tria6", 6},    {"quad4", 4},
@@ -137,7 +137,7 @@ class geometry_parser
 
     void add_section(const std::string &line)
     {
-        const int nodes = nodes_of_type(line);
+        const int nodes = count_nodes_of_element_type(line);
         if (!part_ || (nodes < 0 && line != "coordinates" && !starts_with(line, "block")))
             in_.fail("\"" + line + "\" is not understood");
         if (line == "coordinates")
@@ -296,7 +296,7 @@ std::vector<std::string> split_words(const std::string &text)
     return words;
 }
 
-int components_of(const std::string &key)
+int count_variable_components(const std::string &key)
 {
     if (starts_with(key, "scalar")) return 1;
     if (starts_with(key, "vector")) return 3;
@@ -323,7 +323,7 @@ std::vector<case_file> list_files(const std::string &case_path)
         if (key == "type") is_gold = words.size() == 2 && words[0] == "ensight" && words[1] == "gold";
         if (key == "measured") throw std::runtime_error(case_path + ": measured particles are not read");
         if (key == "model" && !words.empty()) files.push_back({words[0]});
-        const int components = components_of(key);
+        const int components = count_variable_components(key);
         if (components == 0) continue;
         if (words.size() < 2) {
             std::string what = case_path;
@@ -338,7 +338,7 @@ std::vector<case_file> list_files(const std::string &case_path)
 
 /* Returns the paths of the files that match the pattern. Each path is stored under the part of the file's name that the
  * pattern's stars represent, which is the step number. A file without stars is stored under "". */
-std::map<std::string, std::string> matching_files(const std::string &folder, const std::string &pattern)
+std::map<std::string, std::string> list_matching_files(const std::string &folder, const std::string &pattern)
 {
     const size_t first = pattern.find('*'), last = pattern.find_last_of('*');
     if (first == std::string::npos) return {{"", folder + pattern}};
@@ -368,15 +368,15 @@ void check_ensight(const std::string &case_path)
     encoding how = encoding::text;
     for (const case_file &file : files) {
         if (file.components > 0) continue;
-        for (const auto &[number, path] : matching_files(folder, file.pattern)) {
-            how = ensight_stream::encoding_of(path);
+        for (const auto &[number, path] : list_matching_files(folder, file.pattern)) {
+            how = ensight_stream::detect_encoding(path);
             geometries[number] = geometry_parser(path, how).steps();
         }
     }
     if (geometries.empty()) throw std::runtime_error(case_path + ": names no geometry");
     for (const case_file &file : files) {
         if (file.components == 0) continue;
-        for (const auto &[number, path] : matching_files(folder, file.pattern)) {
+        for (const auto &[number, path] : list_matching_files(folder, file.pattern)) {
             const auto same = geometries.find(number);
             check_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second, file);
         }

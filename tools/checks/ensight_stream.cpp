@@ -17,7 +17,7 @@ namespace
 
 constexpr std::streamsize line_bytes = 80;
 
-std::string without_blanks(const std::string &text)
+std::string remove_outer_blanks(const std::string &text)
 {
     const char *const blanks = " \t\r\n";
     const size_t first = text.find_first_not_of(blanks);
@@ -31,7 +31,7 @@ int32_t swapped(int32_t n)
 
 } // namespace
 
-ensight_stream::encoding ensight_stream::encoding_of(const std::string &path)
+ensight_stream::encoding ensight_stream::detect_encoding(const std::string &path)
 {
     std::ifstream in(path, std::ios::binary);
     std::array<char, 20> start{};
@@ -64,7 +64,7 @@ bool ensight_stream::next_line(std::string &line)
 {
     if (how_ == encoding::text) {
         while (std::getline(in_, line)) {
-            line = without_blanks(line);
+            line = remove_outer_blanks(line);
             if (!line.empty()) return true;
         }
         return false;
@@ -73,7 +73,7 @@ bool ensight_stream::next_line(std::string &line)
     begin_record();
     std::array<char, line_bytes + 1> bytes{};
     if (!in_.read(bytes.data(), line_bytes)) fail("is cut short: it ends within a line");
-    line = without_blanks(bytes.data());
+    line = remove_outer_blanks(bytes.data());
     end_record();
     return true;
 }

@@ -16,7 +16,7 @@ class ensight_stream
     /* The encoding of all files of a case. It is recognized by the first bytes of the geometry files. */
     enum class encoding { text, c_binary, fortran_binary };
 
-    static encoding encoding_of(const std::string &path);
+    static encoding detect_encoding(const std::string &path);
     ensight_stream(const std::string &path, encoding how);
 
     /* Reads the next line, without leading and trailing blanks; in text files blank lines are skipped. Returns false at

@@ -34,7 +34,7 @@ void check_last_line(const std::string &path)
     throw std::runtime_error(path + ": is cut short: its last line has no end");
 }
 
-std::string last_bytes(const std::string &path, int64_t count)
+std::string read_last_bytes(const std::string &path, int64_t count)
 {
     std::ifstream in(path, std::ios::binary | std::ios::ate);
     const int64_t size = in ? static_cast<int64_t>(in.tellg()) : 0, start = std::max<int64_t>(size - count, 0);
@@ -47,7 +47,7 @@ std::string last_bytes(const std::string &path, int64_t count)
 /* Throws unless the last 4096 bytes of the file contain the last tag of VTK's XML formats, </VTKFile>. */
 void check_last_tag(const std::string &path)
 {
-    const bool is_whole = last_bytes(path, 4096).find("</VTKFile>") != std::string::npos;
+    const bool is_whole = read_last_bytes(path, 4096).find("</VTKFile>") != std::string::npos;
     if (!is_whole) throw std::runtime_error(path + ": is cut short: it has no </VTKFile> at its end");
 }
 

@@ -103,7 +103,7 @@ class legacy_parser
     }
 
     /* Returns the size of this many values in bytes, or -1 if the type is unknown or its values differ in size. */
-    int64_t bytes_of(int64_t values, const std::string &type) const
+    int64_t compute_size_of_values(int64_t values, const std::string &type) const
     {
         static const std::map<std::string, int64_t> sizes = {
             {"char", 1},           {"signed_char", 1}, {"unsigned_char", 1},      {"short", 2},
@@ -119,7 +119,7 @@ class legacy_parser
     bool skip_values(int64_t values, const std::string &type)
     {
         if (values / 8 > size_) fail("it says it has " + std::to_string(values) + " values");
-        const int64_t bytes = bytes_of(values, type);
+        const int64_t bytes = compute_size_of_values(values, type);
         if (bytes < 0) return false;
         if (is_text_) {
             skip_words(values);

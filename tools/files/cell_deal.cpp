@@ -157,7 +157,7 @@ struct deal {
 };
 
 /* Returns this rank's part of a leaf. */
-vtkSmartPointer<vtkDataObject> part_of_leaf(const leaf &l, const deal &d)
+vtkSmartPointer<vtkDataObject> make_part_of_leaf(const leaf &l, const deal &d)
 {
     extent whole, part;
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data))
@@ -165,13 +165,14 @@ vtkSmartPointer<vtkDataObject> part_of_leaf(const leaf &l, const deal &d)
     if (!find_extent(l.data, whole)) return d.rank == 0 ? l.data : nullptr;
     auto *grid = vtkDataSet::SafeDownCast(l.data);
     if (d.how != partition::block) return hide_others(grid, l.first_cell, d.owners, d.rank);
-    if (!part_of_extent(whole, {l.first_cell, cells_of_extent(whole), d.cells}, d.rank, d.ranks, part)) return nullptr;
+    if (!find_part_of_extent(whole, {l.first_cell, count_cells_of_extent(whole), d.cells}, d.rank, d.ranks, part))
+        return nullptr;
     if (part == whole) return grid;
     return crop(grid, part);
 }
 
 /* Distributes the grids of overlapping AMR. The boxes of all levels stay on all ranks. */
-vtkSmartPointer<vtkDataObject> part_of_amr(vtkOverlappingAMR *amr, const std::vector<leaf> &leaves, const deal &d)
+vtkSmartPointer<vtkDataObject> make_part_of_amr(vtkOverlappingAMR *amr, const std::vector<leaf> &leaves, const deal &d)
 {
     std::vector<int> counts;
     for (unsigned level = 0; level < amr->GetNumberOfLevels(); level++)
@@ -220,11 +221,11 @@ vtkSmartPointer<vtkDataObject> distribute_cells(vtkDataObject *data, partition h
     const int64_t cells = std::max<int64_t>(number_cells(leaves, bounds), 1);
     const owner owners(how, ranks, cells, bounds);
     const deal d = {owners, how, rank, ranks, cells};
-    if (auto *amr = vtkOverlappingAMR::SafeDownCast(data)) return part_of_amr(amr, leaves, d);
-    if (!vtkCompositeDataSet::SafeDownCast(data)) return part_of_leaf(leaves[0], d);
+    if (auto *amr = vtkOverlappingAMR::SafeDownCast(data)) return make_part_of_amr(amr, leaves, d);
+    if (!vtkCompositeDataSet::SafeDownCast(data)) return make_part_of_leaf(leaves[0], d);
     auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
     all->SetNumberOfBlocks(static_cast<unsigned>(leaves.size()));
-    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), part_of_leaf(leaves[i], d));
+    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), make_part_of_leaf(leaves[i], d));
     return all;
 }
 

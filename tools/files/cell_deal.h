@@ -19,9 +19,9 @@ enum class partition {
 
 bool parse_partition(const std::string &text, partition &out);
 
-/* Returns this rank's part of data, which must be the result of drawable_data_of() or grids_of() (grids_of.h). Every
- * cell belongs to exactly one rank. Leaves of composites keep their numbers; those without a cell for this rank are
- * null. If all of data belongs to this rank, data itself is returned.
+/* Returns this rank's part of data, which must be the result of convert_to_drawable_data() or grids_of() (grids_of.h).
+ * Every cell belongs to exactly one rank. Leaves of composites keep their numbers; those without a cell for this rank
+ * are null. If all of data belongs to this rank, data itself is returned.
  *
  * - Of unstructured grids the part has the rank's cells, the points they use, and all arrays.
  * - Of structured grids it is a block. In a partition by single cells it is the whole grid, in which the cells of other

@@ -52,7 +52,7 @@ class face_streams
   public:
     void add(vtkUnstructuredGrid *grid, vtkIdType cell, renumbering &points)
     {
-        const vtkIdType length = length_of(grid, cell, points);
+        const vtkIdType length = find_stream_length(grid, cell, points);
         places_->InsertNextValue(length > 0 ? stream_->GetNumberOfValues() : -1);
         if (length == 0) return;
         const vtkIdType *from = grid->GetFaces()->GetPointer(grid->GetFaceLocations()->GetValue(cell));
@@ -74,7 +74,7 @@ class face_streams
     vtkNew<vtkIdTypeArray> stream_, places_;
 
     /* Returns the length of a cell's stream, or 0 if it exceeds the array or names a point that does not exist. */
-    static vtkIdType length_of(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
+    static vtkIdType find_stream_length(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
     {
         vtkIdTypeArray *const all = grid->GetFaces(), *const starts = grid->GetFaceLocations();
         if (!all || !starts || cell >= starts->GetNumberOfValues()) return 0;

@@ -44,7 +44,7 @@ using name_buffer = std::array<char, 33>; // CGNS names have at most 32 bytes
 
 /* Returns the dimension of an element type, recognized by the prefix of its name, for example HEXA_27. Returns 3 for
  * polyhedra and unknown types. */
-int dimension_of(element_type type)
+int get_element_dimension(element_type type)
 {
     const std::string name = cg_ElementTypeName(type);
     const auto begins = [&](const char *start) { return name.rfind(start, 0) == 0; };
@@ -135,7 +135,7 @@ class cgns_zone
                             &has_parents) != CG_OK)
             return;
         s.name = name.data();
-        s.dimension = dimension_of(s.type == CGNS_ENUMV(MIXED) ? first_type(s) : s.type);
+        s.dimension = get_element_dimension(s.type == CGNS_ENUMV(MIXED) ? first_type(s) : s.type);
         sections_.push_back(s);
     }
 
@@ -173,7 +173,7 @@ class cgns_zone
 
 /* Returns the new numbers for all zones that VTK would misread. Throws if the elements of a zone cannot be
  * renumbered. */
-new_numbers numbers_for_vtk(const std::string &path)
+new_numbers renumber_for_vtk(const std::string &path)
 {
     new_numbers all;
     int file = -1, bases = 0;
@@ -401,11 +401,11 @@ vtkStandardNewMacro(reader)
 
 } // namespace
 
-vtkSmartPointer<vtkAlgorithm> make_cgns(const std::string &path)
+vtkSmartPointer<vtkAlgorithm> make_cgns_reader(const std::string &path)
 {
     /* Throws if the file cannot be opened, because VTK's reader would terminate the program. */
     (void)node_file(path, CGIO_MODE_READ);
-    const new_numbers numbers = numbers_for_vtk(path);
+    const new_numbers numbers = renumber_for_vtk(path);
     auto r = vtkSmartPointer<reader>::New();
     if (numbers.empty()) {
         r->SetFileName(path.c_str());

@@ -80,7 +80,7 @@ class vtk_file : public data_file
         if (kind.piece_tag) pieces_ = count_tags(path, kind.piece_tag);
         if (kind.has_extents && info && info->Has(pipeline::WHOLE_EXTENT())) {
             info->Get(pipeline::WHOLE_EXTENT(), whole_.data());
-            cells_ = cells_of_extent(whole_);
+            cells_ = count_cells_of_extent(whole_);
             pieces_ = static_cast<int>(std::clamp<int64_t>(cells_, 1, INT_MAX));
         }
     }
@@ -102,7 +102,7 @@ class vtk_file : public data_file
         const quiet_stderr quiet;
         extent part;
         const bool is_extent = cells_ > 0;
-        if (is_extent && !part_of_extent(whole_, {0, cells_, cells_}, piece, pieces, part)) return nullptr;
+        if (is_extent && !find_part_of_extent(whole_, {0, cells_, cells_}, piece, pieces, part)) return nullptr;
         if (is_extent)
             reader_->UpdateExtent(part.data());
         else if (step < times_.size())
@@ -173,7 +173,7 @@ bool may_hold_steps(const std::string &path)
     return kind && kind->may_hold_steps;
 }
 
-std::string why_not_data(const std::string &path)
+std::string find_reason_not_data(const std::string &path)
 {
     struct stat info;
     if (stat(path.c_str(), &info) != 0) return path + ": " + std::strerror(errno);
@@ -187,7 +187,7 @@ std::string why_not_data(const std::string &path)
 
 std::unique_ptr<data_file> open_data_file(const std::string &path)
 {
-    const std::string why_not = why_not_data(path);
+    const std::string why_not = find_reason_not_data(path);
     if (!why_not.empty()) throw std::runtime_error(why_not);
     const file_kind &kind = *kind_of(path);
     const std::string ending = kind.ending;
@@ -211,7 +211,7 @@ std::unique_ptr<data_file> open_by_vtk(const std::string &path)
     return std::make_unique<vtk_file>(path, *kind_of(path));
 }
 
-double time_of(vtkDataObject *data, double fallback)
+double get_time_of_data(vtkDataObject *data, double fallback)
 {
     vtkFieldData *fields = data ? data->GetFieldData() : nullptr;
     vtkDataArray *time = fields ? fields->GetArray("TimeValue") : nullptr;

@@ -16,7 +16,7 @@ namespace render_tool
 
 /* Returns "", or the reason why the file cannot be read as data: it does not exist, is a directory, is not readable, or
  * has an unknown extension. */
-std::string why_not_data(const std::string &path);
+std::string find_reason_not_data(const std::string &path);
 
 /* Returns the supported extensions for help texts: ".vtu .pvtu ...". */
 std::string known_endings();
@@ -67,7 +67,7 @@ std::unique_ptr<data_file> open_data_file(const std::string &path);
 std::unique_ptr<data_file> open_by_vtk(const std::string &path);
 
 /* Returns the time in the field data TimeValue of a data set, or fallback if it has none. */
-double time_of(vtkDataObject *data, double fallback);
+double get_time_of_data(vtkDataObject *data, double fallback);
 
 } // namespace render_tool
 

@@ -261,7 +261,7 @@ vtkStandardNewMacro(reader)
 
 } // namespace
 
-vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
+vtkSmartPointer<vtkAlgorithm> make_exodus_reader(const std::string &path)
 {
     auto r = vtkSmartPointer<reader>::New();
     const exodus_file file(path);

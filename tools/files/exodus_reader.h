@@ -15,9 +15,9 @@ namespace render_tool
  * the same corners. Throws std::runtime_error with the block, the element type and its number of nodes if an element
  * has fewer nodes than corners; the reader reports the same for element types that are unknown to VTK and to this
  * file. */
-vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path);
+vtkSmartPointer<vtkAlgorithm> make_exodus_reader(const std::string &path);
 
-/* Returns a warning if the reader, which make_exodus() must have created, displaces points; otherwise "". */
+/* Returns a warning if the reader, which make_exodus_reader() must have created, displaces points; otherwise "". */
 std::string exodus_warnings(const std::string &path, vtkAlgorithm *reader);
 
 } // namespace render_tool

@@ -16,7 +16,7 @@ namespace render_tool
 namespace
 {
 
-int cells_along(const extent &of, size_t axis)
+int count_cells_along_axis(const extent &of, size_t axis)
 {
     return of[2 * axis + 1] - of[2 * axis];
 }
@@ -25,13 +25,13 @@ size_t longest_axis(const extent &of)
 {
     size_t longest = 2;
     for (const size_t axis : {size_t{1}, size_t{0}})
-        if (cells_along(of, axis) > cells_along(of, longest)) longest = axis;
+        if (count_cells_along_axis(of, axis) > count_cells_along_axis(of, longest)) longest = axis;
     return longest;
 }
 
 /* All distributed cells are divided into equal parts, one per rank. Returns the index of the first cell of the rank's
  * part. */
-double first_of_rank(const cell_range &range, int rank, int ranks)
+double compute_first_cell_of_rank(const cell_range &range, int rank, int ranks)
 {
     return static_cast<double>(range.total) * rank / ranks;
 }
@@ -48,15 +48,15 @@ bool find_extent(vtkDataObject *data, extent &out)
         curvilinear->GetExtent(out.data());
     else
         return false;
-    return cells_of_extent(out) > 0;
+    return count_cells_of_extent(out) > 0;
 }
 
-int64_t cells_of_extent(const extent &whole)
+int64_t count_cells_of_extent(const extent &whole)
 {
     int64_t cells = 1;
     int dimensions = 0;
     for (size_t axis = 0; axis < 3; axis++) {
-        const int along = cells_along(whole, axis);
+        const int along = count_cells_along_axis(whole, axis);
         if (along < 0) return 0;
         if (along == 0) continue;
         cells *= along;
@@ -65,17 +65,17 @@ int64_t cells_of_extent(const extent &whole)
     return dimensions > 1 ? cells : 0;
 }
 
-bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part)
+bool find_part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part)
 {
     int first = 0, end = ranks; /* the ranks among which `part` is divided */
     auto low = static_cast<double>(range.first), high = static_cast<double>(range.first + range.count);
     part = whole;
     while (end - first > 1) {
         const int middle = (first + end) / 2;
-        const double border = std::clamp(first_of_rank(range, middle, ranks), low, high);
+        const double border = std::clamp(compute_first_cell_of_rank(range, middle, ranks), low, high);
         const size_t axis = longest_axis(part);
         const double share = high > low ? (border - low) / (high - low) : 0;
-        const int cut = part[2 * axis] + static_cast<int>(std::lround(share * cells_along(part, axis)));
+        const int cut = part[2 * axis] + static_cast<int>(std::lround(share * count_cells_along_axis(part, axis)));
         if (rank < middle) {
             part[2 * axis + 1] = cut;
             high = border;
@@ -85,7 +85,7 @@ bool part_of_extent(const extent &whole, const cell_range &range, int rank, int 
             low = border;
             first = middle;
         }
-        if (cells_along(part, axis) == 0) return false;
+        if (count_cells_along_axis(part, axis) == 0) return false;
     }
     return true;
 }

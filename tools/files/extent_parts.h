@@ -21,7 +21,7 @@ using extent = std::array<int, 6>;
 bool find_extent(vtkDataObject *data, extent &out);
 
 /* Returns the number of cells of two or three dimensions in the extent; 0 if it has fewer dimensions. */
-int64_t cells_of_extent(const extent &whole);
+int64_t count_cells_of_extent(const extent &whole);
 
 /* A range of the cells that are distributed to ranks: the index of its first cell and its number of cells. `total` is
  * the number of all distributed cells. */
@@ -33,7 +33,7 @@ struct cell_range {
  * cells are its cells. All distributed cells are divided into equal parts, one per rank. The size of the part that a
  * rank gets of this data set is proportional to the number of cells that the rank's equal part and `range` have in
  * common. Returns false if the rank gets no part. */
-bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part);
+bool find_part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part);
 
 /* Copies the part of a structured data set. */
 vtkSmartPointer<vtkDataSet> crop(vtkDataSet *data, const extent &part);

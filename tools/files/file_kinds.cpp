@@ -41,14 +41,14 @@ namespace
 
 using reader = vtkSmartPointer<vtkAlgorithm>;
 
-template <typename Reader> reader make_plain(const std::string &path)
+template <typename Reader> reader make_plain_reader(const std::string &path)
 {
     auto r = vtkSmartPointer<Reader>::New();
     r->SetFileName(path.c_str());
     return r;
 }
 
-reader make_legacy(const std::string &path)
+reader make_legacy_reader(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkGenericDataObjectReader>::New();
     r->SetFileName(path.c_str());
@@ -70,7 +70,7 @@ reader make_amr(const std::string &path)
 }
 
 #ifdef INSITU_VTK_ENSIGHT
-reader make_ensight(const std::string &path)
+reader make_ensight_reader(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkGenericEnSightReader>::New();
     r->SetCaseFileName(path.c_str());
@@ -82,7 +82,7 @@ reader make_ensight(const std::string &path)
 #ifdef INSITU_VTK_OPENFOAM
 /* Creates a reader of the mesh's cells with the values that the solver computed, without VTK's averages at the
  * points. */
-reader make_openfoam(const std::string &path)
+reader make_openfoam_reader(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkOpenFOAMReader>::New();
     r->SetFileName(path.c_str());
@@ -104,40 +104,40 @@ const std::vector<file_kind> &file_kinds()
 {
     constexpr bool no = false, yes = true;
     static const std::vector<file_kind> kinds = {
-        {".vtu", make_plain<vtkXMLUnstructuredGridReader>, no, no, nullptr, no},
+        {".vtu", make_plain_reader<vtkXMLUnstructuredGridReader>, no, no, nullptr, no},
         {".pvtu", nullptr, no, no, nullptr, no},
-        {".vti", make_plain<vtkXMLImageDataReader>, no, no, nullptr, yes},
-        {".pvti", make_plain<vtkXMLPImageDataReader>, no, yes, nullptr, yes},
-        {".vtr", make_plain<vtkXMLRectilinearGridReader>, no, no, nullptr, yes},
-        {".pvtr", make_plain<vtkXMLPRectilinearGridReader>, no, yes, nullptr, yes},
-        {".vtp", make_plain<vtkXMLPolyDataReader>, no, no, nullptr, no},
-        {".vts", make_plain<vtkXMLStructuredGridReader>, no, no, nullptr, yes},
-        {".pvts", make_plain<vtkXMLPStructuredGridReader>, no, yes, nullptr, yes},
-        {".vtm", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
-        {".vtmb", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
-        {".vtpc", make_plain<vtkXMLPartitionedDataSetCollectionReader>, no, yes, nullptr, no},
+        {".vti", make_plain_reader<vtkXMLImageDataReader>, no, no, nullptr, yes},
+        {".pvti", make_plain_reader<vtkXMLPImageDataReader>, no, yes, nullptr, yes},
+        {".vtr", make_plain_reader<vtkXMLRectilinearGridReader>, no, no, nullptr, yes},
+        {".pvtr", make_plain_reader<vtkXMLPRectilinearGridReader>, no, yes, nullptr, yes},
+        {".vtp", make_plain_reader<vtkXMLPolyDataReader>, no, no, nullptr, no},
+        {".vts", make_plain_reader<vtkXMLStructuredGridReader>, no, no, nullptr, yes},
+        {".pvts", make_plain_reader<vtkXMLPStructuredGridReader>, no, yes, nullptr, yes},
+        {".vtm", make_plain_reader<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
+        {".vtmb", make_plain_reader<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
+        {".vtpc", make_plain_reader<vtkXMLPartitionedDataSetCollectionReader>, no, yes, nullptr, no},
         {".vthb", make_amr, no, yes, nullptr, no},
-        {".vtk", make_legacy, no, no, nullptr, no},
+        {".vtk", make_legacy_reader, no, no, nullptr, no},
         {".pvd", nullptr, yes, no, nullptr, no},
         {".series", nullptr, yes, no, nullptr, no},
 #ifdef INSITU_VTK_HDF
-        {".vtkhdf", make_plain<vtkHDFReader>, yes, no, nullptr, no},
+        {".vtkhdf", make_plain_reader<vtkHDFReader>, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_EXODUS
-        {".ex2", make_exodus, yes, no, nullptr, no},
-        {".exo", make_exodus, yes, no, nullptr, no},
-        {".exii", make_exodus, yes, no, nullptr, no},
-        {".e", make_exodus, yes, no, nullptr, no},
-        {".g", make_exodus, yes, no, nullptr, no},
+        {".ex2", make_exodus_reader, yes, no, nullptr, no},
+        {".exo", make_exodus_reader, yes, no, nullptr, no},
+        {".exii", make_exodus_reader, yes, no, nullptr, no},
+        {".e", make_exodus_reader, yes, no, nullptr, no},
+        {".g", make_exodus_reader, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_CGNS
-        {".cgns", make_cgns, yes, no, nullptr, no},
+        {".cgns", make_cgns_reader, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_ENSIGHT
-        {".case", make_ensight, yes, no, nullptr, no},
+        {".case", make_ensight_reader, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_OPENFOAM
-        {".foam", make_openfoam, yes, no, nullptr, no},
+        {".foam", make_openfoam_reader, yes, no, nullptr, no},
 #endif
     };
     return kinds;

@@ -26,7 +26,7 @@ namespace
 {
 
 /* Returns the grid, or a shallow copy with ghost flags of VTK's type if its cells have other ghost flags. */
-vtkSmartPointer<vtkUnstructuredGrid> with_ghost_bytes(vtkUnstructuredGrid *grid)
+vtkSmartPointer<vtkUnstructuredGrid> convert_ghosts_to_bytes(vtkUnstructuredGrid *grid)
 {
     const auto flags = vtkSmartPointer<vtkUnsignedCharArray>::Take(
         insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
@@ -56,7 +56,7 @@ vtkSmartPointer<vtkDataObject> convert_leaves(vtkCompositeDataSet *composite, Co
 }
 
 /* Converts a leaf to an unstructured grid. An object that is not a data set is returned unchanged. */
-vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &path)
+vtkSmartPointer<vtkDataObject> convert_leaf_to_grid(vtkDataObject *leaf, const std::string &path)
 {
     auto *data = vtkDataSet::SafeDownCast(leaf);
     if (!data) return leaf;
@@ -64,7 +64,7 @@ vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &p
     if (!grid) grid.TakeReference(insitu_vtk_make_grid(data));
     const std::string bad = find_bad_cell(grid);
     if (!bad.empty()) throw std::runtime_error(path + ": " + bad);
-    return with_ghost_bytes(grid);
+    return convert_ghosts_to_bytes(grid);
 }
 
 template <typename Array>
@@ -103,17 +103,17 @@ std::string find_bad_cell(vtkUnstructuredGrid *grid)
 vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &path)
 {
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
-    if (!composite) return grid_of(data, path);
+    if (!composite) return convert_leaf_to_grid(data, path);
     if (auto *amr = vtkOverlappingAMR::SafeDownCast(data)) vtkAMRUtilities::BlankCells(amr);
-    return convert_leaves(composite, [&](vtkDataObject *leaf) { return grid_of(leaf, path); });
+    return convert_leaves(composite, [&](vtkDataObject *leaf) { return convert_leaf_to_grid(leaf, path); });
 }
 
-vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path)
+vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, const std::string &path)
 {
     const auto convert = [&](vtkDataObject *leaf) -> vtkSmartPointer<vtkDataObject> {
         extent whole;
         if (find_extent(leaf, whole)) return leaf;
-        return grid_of(leaf, path);
+        return convert_leaf_to_grid(leaf, path);
     };
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) return convert(data);

@@ -22,7 +22,7 @@ vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &
 /* Returns data in a form that the VTK adaptor draws. Overlapping AMR, and images, rectilinear and curvilinear grids
  * with cells of two or three dimensions, are not converted; cells of AMR that a finer level covers get a ghost flag.
  * All other data is converted as by grids_of(). Throws as grids_of() does. */
-vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path);
+vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, const std::string &path);
 
 /* Returns "", or a description of the first cell that lies outside the connectivity or refers to a point that does not
  * exist. */

@@ -80,7 +80,7 @@ int vtk_type(hid_t type)
     }
 }
 
-hid_t memory_type(int type)
+hid_t find_memory_type(int type)
 {
     switch (type) {
     case VTK_FLOAT: return H5T_NATIVE_FLOAT;
@@ -182,7 +182,7 @@ class hdf_reader
         sizes[0] = static_cast<hsize_t>(count);
         H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, sizes.data(), nullptr);
         const handle memory(H5Screate_simple(rank, sizes.data(), nullptr), H5Sclose);
-        if (H5Dread(set, memory_type(type), memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
+        if (H5Dread(set, find_memory_type(type), memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
             fail(name + " is unreadable");
         return array;
     }
@@ -240,7 +240,7 @@ class hdf_grids : public data_file
         auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
         all->SetNumberOfBlocks(static_cast<unsigned>(count));
         if (count == 0) return all;
-        part_position at = first_part(step);
+        part_position at = find_first_part(step);
         const part_position first = at;
         for (int64_t i = 0; i < count; i++) {
             set_counts(at);
@@ -269,7 +269,7 @@ class hdf_grids : public data_file
     std::vector<double> times_;
 
     /* Returns an entry of Steps, or `missing` if there are no steps or there is no such list. */
-    int64_t step_entry(const std::string &name, size_t step, int64_t missing) const
+    int64_t read_step_entry(const std::string &name, size_t step, int64_t missing) const
     {
         const std::string list = "/VTKHDF/Steps/" + name;
         return has_steps_ && in_.has(list) ? in_.number(list, static_cast<int64_t>(step)) : missing;
@@ -279,23 +279,23 @@ class hdf_grids : public data_file
     {
         const array_pointer parts = in_.rows("/VTKHDF/NumberOfPoints", 0, -1, VTK_ID_TYPE);
         const int64_t all = parts ? parts->GetNumberOfTuples() : 0;
-        const int64_t count = step_entry("NumberOfParts", step, in_.has("/VTKHDF/Steps/PartOffsets") ? 1 : all);
+        const int64_t count = read_step_entry("NumberOfParts", step, in_.has("/VTKHDF/Steps/PartOffsets") ? 1 : all);
         if (count < 0 || count > all)
             in_.fail("step " + std::to_string(step) + " has " + std::to_string(count) + " parts, of " +
                      std::to_string(all));
         return count;
     }
 
-    part_position first_part(size_t step) const
+    part_position find_first_part(size_t step) const
     {
         part_position at;
-        at.part = step_entry("PartOffsets", step, 0);
-        at.point = step_entry("PointOffsets", step, 0);
-        at.cell = step_entry("CellOffsets", step, 0);
-        at.id = step_entry("ConnectivityIdOffsets", step, 0);
+        at.part = read_step_entry("PartOffsets", step, 0);
+        at.point = read_step_entry("PointOffsets", step, 0);
+        at.cell = read_step_entry("CellOffsets", step, 0);
+        at.id = read_step_entry("ConnectivityIdOffsets", step, 0);
         set_counts(at);
         at.offset = at.cell + at.part;
-        if (!offsets_fit(at)) at.offset = at.cell + offset_lead(at);
+        if (!offsets_fit(at)) at.offset = at.cell + count_extra_offsets(at);
         return at;
     }
 
@@ -309,7 +309,7 @@ class hdf_grids : public data_file
     /* Returns the difference between a part's first index in the file's list of offsets and its first index in the list
      * of cells. Each earlier part increases the difference by 1, because it has one more offset than cells. Parts that
      * reuse the cells of an earlier step have no entries in either list, and are not counted. */
-    int64_t offset_lead(const part_position &at) const
+    int64_t count_extra_offsets(const part_position &at) const
     {
         int64_t parts = 0;
         for (int64_t cells = 0; parts < at.part && cells < at.cell; parts++)
@@ -372,7 +372,8 @@ class hdf_grids : public data_file
             path.append(group).append("/").append(name);
             std::string place = group;
             place.append("Offsets/").append(name);
-            const array_pointer values = in_.rows(path, step_entry(place, at.step, at.first) + at.in_step, at.count);
+            const array_pointer values =
+                in_.rows(path, read_step_entry(place, at.step, at.first) + at.in_step, at.count);
             if (!values) continue;
             values->SetName(name.c_str());
             to->AddArray(values);

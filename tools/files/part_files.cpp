@@ -90,7 +90,7 @@ std::unique_ptr<data_file> open_nemesis(const std::string &path, const nemesis_n
         const std::string number = std::to_string(i);
         const size_t zeros = number.size() < name.digits ? name.digits - number.size() : 0;
         parts.push_back(name.start + std::string(zeros, '0') + number);
-        const std::string why_not = why_not_data(parts.back());
+        const std::string why_not = find_reason_not_data(parts.back());
         if (!why_not.empty())
             throw std::runtime_error(std::string(why_not)
                                          .append(", one of the ")

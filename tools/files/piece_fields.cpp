@@ -25,7 +25,7 @@ namespace render_tool
 namespace
 {
 
-vtkDataSetAttributes *data_of(vtkUnstructuredGrid *grid, bool is_at_points)
+vtkDataSetAttributes *get_grid_attributes(vtkUnstructuredGrid *grid, bool is_at_points)
 {
     if (is_at_points) return grid->GetPointData();
     return grid->GetCellData();
@@ -96,9 +96,9 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
 {
     if (fields.empty()) return;
     for (const bool is_at_points : {true, false})
-        remove_undeclared(data_of(grid, is_at_points), is_at_points, fields, piece, warnings);
+        remove_undeclared(get_grid_attributes(grid, is_at_points), is_at_points, fields, piece, warnings);
     for (const declared_field &f : fields) {
-        vtkDataSetAttributes *data = data_of(grid, f.is_at_points);
+        vtkDataSetAttributes *data = get_grid_attributes(grid, f.is_at_points);
         vtkDataArray *array = data->GetArray(f.name.c_str());
         const std::string field = piece + ": its field \"" + f.name + "\"";
         if (!array) {
@@ -115,12 +115,12 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
     }
 }
 
-void unify_types(const std::vector<vtkUnstructuredGrid *> &pieces)
+void unify_field_types(const std::vector<vtkUnstructuredGrid *> &pieces)
 {
     std::map<std::pair<bool, std::string>, std::set<int>> types;
     for (const bool is_at_points : {true, false})
         for (vtkUnstructuredGrid *grid : pieces) {
-            vtkDataSetAttributes *data = data_of(grid, is_at_points);
+            vtkDataSetAttributes *data = get_grid_attributes(grid, is_at_points);
             for (int i = 0; i < data->GetNumberOfArrays(); i++)
                 if (vtkDataArray *array = data->GetArray(i))
                     if (array->GetName()) types[{is_at_points, array->GetName()}].insert(array->GetDataType());
@@ -128,7 +128,7 @@ void unify_types(const std::vector<vtkUnstructuredGrid *> &pieces)
     for (const auto &[field, of_field] : types) {
         if (of_field.size() < 2 || is_ghost_array(field.second)) continue;
         for (vtkUnstructuredGrid *grid : pieces) {
-            vtkDataSetAttributes *data = data_of(grid, field.first);
+            vtkDataSetAttributes *data = get_grid_attributes(grid, field.first);
             vtkDataArray *array = data->GetArray(field.second.c_str());
             if (!array || array->GetDataType() == VTK_DOUBLE) continue;
             const auto wide =

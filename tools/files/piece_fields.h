@@ -30,7 +30,7 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
 
 /* Converts fields that have different types in these pieces to double in all of them, because appending would drop such
  * fields. */
-void unify_types(const std::vector<vtkUnstructuredGrid *> &pieces);
+void unify_field_types(const std::vector<vtkUnstructuredGrid *> &pieces);
 
 } // namespace render_tool
 

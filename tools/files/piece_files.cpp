@@ -78,7 +78,7 @@ std::string file_named_by(vtkXMLDataElement *element, const char *attribute, con
     const char *name = element->GetAttribute(attribute);
     if (!name || !name[0]) refuse(path, "a " + std::string(element->GetName()) + " names no file");
     std::string file = make_sibling_path(path, name);
-    const std::string why_not = why_not_data(file);
+    const std::string why_not = find_reason_not_data(file);
     if (!why_not.empty()) refuse(path, why_not);
     return file;
 }
@@ -91,12 +91,12 @@ bool is_table(const char *name)
     return text.size() > 4 && text.compare(text.size() - 4, 4, ".vtt") == 0;
 }
 
-void check_named(vtkXMLDataElement *element, const std::string &path)
+void check_named_file(vtkXMLDataElement *element, const std::string &path)
 {
     for (const char *attribute : {"file", "Source"})
         if (const char *name = element->GetAttribute(attribute))
             if (!is_table(name)) check_length(file_named_by(element, attribute, path));
-    for (int i = 0; i < element->GetNumberOfNestedElements(); i++) check_named(element->GetNestedElement(i), path);
+    for (int i = 0; i < element->GetNumberOfNestedElements(); i++) check_named_file(element->GetNestedElement(i), path);
 }
 
 /* Checks whether file `index` of `count` belongs to piece `piece` of `pieces`. */
@@ -108,7 +108,7 @@ bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
 
 /* Adds ghost flags to pieces without them, because appending keeps only arrays that all pieces have. */
-void unify_ghosts(const grid_list &grids)
+void unify_ghost_flags(const grid_list &grids)
 {
     const bool has_ghosts = std::any_of(grids.begin(), grids.end(), [](auto &g) { return g->GetCellGhostArray(); });
     for (const auto &grid : grids)
@@ -119,8 +119,8 @@ vtkSmartPointer<vtkUnstructuredGrid> append(const grid_list &grids)
 {
     if (grids.empty()) return vtkSmartPointer<vtkUnstructuredGrid>::New();
     if (grids.size() == 1) return grids[0];
-    unify_ghosts(grids);
-    unify_types({grids.begin(), grids.end()});
+    unify_ghost_flags(grids);
+    unify_field_types({grids.begin(), grids.end()});
     vtkNew<vtkAppendFilter> filter;
     for (const auto &grid : grids) filter->AddInputData(grid);
     filter->Update();
@@ -266,7 +266,7 @@ Json::Value parse_json(const std::string &path)
 void check_named_files(const std::string &path)
 {
     const auto root = read_xml(path);
-    check_named(root, path);
+    check_named_file(root, path);
 }
 
 std::unique_ptr<data_file> open_pvtu(const std::string &path)
@@ -303,7 +303,8 @@ std::unique_ptr<data_file> open_series(const std::string &path)
         if (!entry.isObject() || !entry["name"].isString() || entry["name"].asString().empty())
             refuse(path, "an entry of \"files\" has no \"name\"");
         if (!entry["time"].isNumeric()) refuse(path, entry["name"].asString() + ": \"time\" is no number");
-        const std::string file = make_sibling_path(path, entry["name"].asString()), why_not = why_not_data(file);
+        const std::string file = make_sibling_path(path, entry["name"].asString()),
+                          why_not = find_reason_not_data(file);
         if (!why_not.empty()) refuse(path, why_not);
         steps.push_back({entry["time"].asDouble(), {file}});
     }

@@ -65,7 +65,7 @@ vtkStandardNewMacro(message_catcher)
 /* Extracts the part of VTK's messages that is useful to the user. A message begins with "ERROR: In file, line n",
  * continues on the next line with "class (0x...): " and the useful text, and ends with empty lines. The class may be
  * missing. */
-std::string message_text(std::string text)
+std::string extract_message_text(std::string text)
 {
     if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";
     const size_t address = text.find("): "), first_line = text.find('\n');
@@ -93,7 +93,7 @@ void catch_vtk_messages()
 void throw_pending_message(const std::string &path)
 {
     if (!catcher || catcher->first_error.empty()) return;
-    const std::string text = message_text(catcher->first_error);
+    const std::string text = extract_message_text(catcher->first_error);
     catcher->first_error.clear();
     throw std::runtime_error(path + ": cannot be read: " + text);
 }

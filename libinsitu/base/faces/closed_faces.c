@@ -5,7 +5,7 @@
 #include "memory.h"
 #include "polygon.h"
 
-bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell)
+bool closed_faces_count_entries(closed_faces *c, const grid *g, int64_t cell)
 {
     int64_t first, end, entries = 0;
     grid_cell_faces(g, cell, &first, &end);
@@ -13,7 +13,7 @@ bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell)
     c->face_count = (int)(end - first);
     for (int64_t i = first; i < end; i++) {
         int64_t from, to;
-        grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &to);
+        grid_face_vertices(g, grid_read_index(&g->connectivity, i), &from, &to);
         entries += to - from;
     }
     if (entries > INT32_MAX / 64) return false;
@@ -55,7 +55,7 @@ static size_t hash_pair(uint64_t a, uint64_t b)
     return (size_t)((h * 0x9e3779b97f4a7c15u) >> 20);
 }
 
-static int find_vertex_number(closed_faces *c, int64_t vertex)
+static int find_or_add_vertex_number(closed_faces *c, int64_t vertex)
 {
     const size_t last = (size_t)(c->table_size - 1);
     size_t at = hash_pair((uint64_t)vertex, 1) & last;
@@ -76,14 +76,14 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
     grid_cell_faces(g, cell, &first, &end);
     for (int face = 0; face < c->face_count; face++) {
         int64_t from, to;
-        grid_face_vertices(g, grid_array_index(&g->connectivity, first + face), &from, &to);
+        grid_face_vertices(g, grid_read_index(&g->connectivity, first + face), &from, &to);
         c->first_entries[face] = entry;
-        int64_t before = grid_array_index(&g->face_connectivity, to - 1);
+        int64_t before = grid_read_index(&g->face_connectivity, to - 1);
         for (int64_t i = from; i < to; i++) {
-            const int64_t vertex = grid_array_index(&g->face_connectivity, i);
+            const int64_t vertex = grid_read_index(&g->face_connectivity, i);
             if (vertex == before) continue;
             c->face_of[entry] = face;
-            c->entry_vertices[entry++] = find_vertex_number(c, vertex);
+            c->entry_vertices[entry++] = find_or_add_vertex_number(c, vertex);
             before = vertex;
         }
     }
@@ -108,7 +108,7 @@ int closed_edges_find(closed_faces *c, int a, int b)
     return (int)at;
 }
 
-void closed_edges_empty(closed_faces *c)
+void closed_edges_clear(closed_faces *c)
 {
     for (int i = 0; i < 2 * c->table_size; i++) c->edges[i].low = -1;
 }
@@ -139,7 +139,7 @@ static void orient_piece(closed_faces *c, int first)
 
 void closed_faces_orient(closed_faces *c)
 {
-    closed_edges_empty(c);
+    closed_edges_clear(c);
     c->piece_count = 0;
     for (int side = 0; side < c->entry_count; side++) {
         const int at = closed_edges_find(c, c->entry_vertices[side], get_end_vertex_of_side(c, side));
@@ -187,7 +187,7 @@ void closed_faces_triangulate(closed_faces *c, const double (*positions)[3])
     }
 }
 
-bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3])
+bool closed_face_is_bilinear_patch(const closed_faces *c, int face, const double (*positions)[3])
 {
     double corners[4][3];
     const int first = c->first_entries[face];

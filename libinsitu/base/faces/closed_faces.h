@@ -58,7 +58,7 @@ typedef struct closed_faces {
 
 /* Counts the polyhedron's faces and the entries of their lists. Returns false if there are more than INT32_MAX / 64
  * faces or entries. */
-bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
+bool closed_faces_count_entries(closed_faces *c, const grid *g, int64_t cell);
 
 /* Sets the arrays to sections of `memory`, which must be aligned to 64 bytes, and returns the number of bytes that they
  * take. If memory is NULL, only the size is computed. */
@@ -81,11 +81,11 @@ void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], 
 
 /* Returns whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is
  * concave. Any other face is intersected as its triangles. */
-bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3]);
+bool closed_face_is_bilinear_patch(const closed_faces *c, int face, const double (*positions)[3]);
 
-/* closed_edges_empty() clears the hash table of edges. closed_edges_find() returns the index of the edge between two
+/* closed_edges_clear() clears the hash table of edges. closed_edges_find() returns the index of the edge between two
  * vertices. If the edge is not in the table, it is added, as yet without adjacent faces. */
-void closed_edges_empty(closed_faces *c);
+void closed_edges_clear(closed_faces *c);
 int closed_edges_find(closed_faces *c, int a, int b);
 
 #endif

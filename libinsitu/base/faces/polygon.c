@@ -42,7 +42,7 @@ size_t polygon_work_bytes(int count)
     return (size_t)count * (5 * sizeof(double) + 4 * sizeof(int));
 }
 
-static polygon_work divide_work(int count, char *work, int (*triangles)[3])
+static polygon_work divide_work_memory(int count, char *work, int (*triangles)[3])
 {
     const size_t n = (size_t)count;
     polygon_work w = {.count = count, .triangles = triangles};
@@ -106,7 +106,7 @@ static bool scale_positions(polygon_work *w, const double (*p)[3])
 
 /* Returns whether the polygon can be cut into a fan from its first corner. `normal` receives the polygon's normal; its
  * length is twice the polygon's area. */
-static bool is_fan(const polygon_work *w, double normal[3])
+static bool can_be_cut_into_fan(const polygon_work *w, double normal[3])
 {
     double area[3];
     normal[0] = normal[1] = normal[2] = 0;
@@ -267,7 +267,7 @@ static void cut_ears(polygon_work *w)
 
 void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3])
 {
-    polygon_work w = divide_work(count, work, triangles);
+    polygon_work w = divide_work_memory(count, work, triangles);
     double normal[3];
     find_canonical_corner_order(&w, corners);
     for (int i = 0; i < count; i++) {
@@ -275,7 +275,7 @@ void polygon_triangulate(const double (*corners)[3], int count, void *work, int 
         w.previous[i] = (i + count - 1) % count;
     }
     const bool may_be_concave = count > 3 && scale_positions(&w, corners) && (count > 4 || is_concave_quad(&w));
-    if (!may_be_concave || is_fan(&w, normal)) {
+    if (!may_be_concave || can_be_cut_into_fan(&w, normal)) {
         add_fan(&w, 0);
         return;
     }
@@ -286,7 +286,7 @@ void polygon_triangulate(const double (*corners)[3], int count, void *work, int 
 bool polygon_is_concave_quad(const double (*corners)[3])
 {
     double work[4 * 8];
-    polygon_work w = divide_work(4, (char *)work, NULL);
+    polygon_work w = divide_work_memory(4, (char *)work, NULL);
     find_canonical_corner_order(&w, corners);
     return scale_positions(&w, corners) && is_concave_quad(&w);
 }

@@ -173,7 +173,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     return status;
 }
 
-void session_begin_cinema(session_cinema *cinema, int64_t cycle)
+void session_store_first_cinema_cycle(session_cinema *cinema, int64_t cycle)
 {
     if (!cinema->has_begun) cinema->first_cycle = cycle;
     cinema->has_begun = true;

@@ -39,7 +39,7 @@ typedef struct session_cinema {
 } session_cinema;
 
 /* Stores the first cycle: that of the session's first step, or of the first step after the scene was edited. Local. */
-void session_begin_cinema(session_cinema *cinema, int64_t cycle);
+void session_store_first_cinema_cycle(session_cinema *cinema, int64_t cycle);
 
 /* Adds a line for a picture that was written for an output with a database. If the picture's cycle is not later than
  * that of the table's final line, the run has gone back, and the lines of this cycle and of later cycles are removed

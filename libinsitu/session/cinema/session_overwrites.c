@@ -41,7 +41,7 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
 /* Returns the index of an output whose last picture was written to this file, or -1 if there is none. `file` is the
  * hash of the file's path. A picture that the output `output` itself wrote at the same cycle is ignored, because in
  * that case the step was repeated. */
-static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
+static int find_output_that_wrote_file(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
         if (all->last_files[i].file == file && (i != output || all->last_files[i].cycle != cycle)) return i;
@@ -76,8 +76,8 @@ static bool reserve_entries(session_overwrites *all, const scene *scene)
     return all->last_files != NULL;
 }
 
-void session_record_written(session_overwrites *all, const scene *scene, int image, long long cycle, double time,
-                            session_report *report)
+void session_record_written_files(session_overwrites *all, const scene *scene, int image, long long cycle, double time,
+                                  session_report *report)
 {
     const scene_image *drawn = &scene->images[image];
     const scene_placeholder_values moment = scene_make_placeholder_values(drawn, cycle, time);
@@ -91,7 +91,7 @@ void session_record_written(session_overwrites *all, const scene *scene, int ima
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);
-        const int before = find_last_writer(all, file, first + i, cycle);
+        const int before = find_output_that_wrote_file(all, file, first + i, cycle);
         if (before >= 0) warn_of_overwrite(all, scene, drawn, first + i, before, path, cycle, report);
         all->last_files[first + i] = (session_written){file, cycle};
         base_free(path);

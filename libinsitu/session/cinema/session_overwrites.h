@@ -22,8 +22,8 @@ typedef struct session_overwrites {
 /* Records the files that the image with this index has written at this cycle and time. If a path was already used for
  * the last picture of another output, or of this output at another cycle, a warning is added, once per image. If memory
  * runs out, nothing is recorded. Local. */
-void session_record_written(session_overwrites *overwrites, const scene *scene, int image, long long cycle, double time,
-                            session_report *report);
+void session_record_written_files(session_overwrites *overwrites, const scene *scene, int image, long long cycle,
+                                  double time, session_report *report);
 
 void session_overwrites_free(session_overwrites *overwrites);
 

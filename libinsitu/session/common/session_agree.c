@@ -20,7 +20,7 @@ insitu_status session_fail_for_memory(base_error *error, int64_t bytes, const ch
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of %s", (long long)bytes, what);
 }
 
-insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
+insitu_status session_broadcast_error(MPI_Comm comm, int root, base_error *error)
 {
     base_error shared = *error;
     const int code = MPI_Bcast(&shared, (int)sizeof shared, MPI_BYTE, root, comm);
@@ -48,7 +48,7 @@ static insitu_status agree_on_error(MPI_Comm comm, base_error *error, int with_r
     if (code != MPI_SUCCESS) return session_check_mpi(error, code, "MPI_Allreduce");
     if (first == ranks) return INSITU_OK;
     if (rank == first && with_rank) prefix_message_with_rank(rank, error);
-    return session_share_error(comm, first, error);
+    return session_broadcast_error(comm, first, error);
 }
 
 insitu_status session_agree(MPI_Comm comm, base_error *error)

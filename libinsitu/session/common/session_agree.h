@@ -19,7 +19,7 @@ insitu_status session_agree(MPI_Comm comm, base_error *error);
 insitu_status session_agree_without_rank(MPI_Comm comm, base_error *error);
 
 /* Copies the error of the rank `root` to every rank. Collective. */
-insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
+insitu_status session_broadcast_error(MPI_Comm comm, int root, base_error *error);
 
 /* Converts the return code of an MPI call to a status. If the call failed, *error contains `what` and MPI's reason.
  * Local. */

@@ -10,7 +10,7 @@
 
 #include <omp.h>
 
-void session_guard_begin(session_guard *guard)
+void session_guard_save_settings(session_guard *guard)
 {
     fegetenv(&guard->caller_environment);
     fesetenv(FE_DFL_ENV);
@@ -18,18 +18,18 @@ void session_guard_begin(session_guard *guard)
     omp_set_dynamic(0);
 }
 
-void session_guard_end(const session_guard *guard)
+void session_guard_restore_settings(const session_guard *guard)
 {
     omp_set_dynamic(guard->is_dynamic);
     fesetenv(&guard->caller_environment);
 }
 
-void session_guard_suspend(const session_guard *guard)
+void session_guard_set_caller_fenv(const session_guard *guard)
 {
     fesetenv(&guard->caller_environment);
 }
 
-void session_guard_resume(void)
+void session_guard_set_default_fenv(void)
 {
     fesetenv(FE_DFL_ENV);
 }

@@ -11,16 +11,16 @@ typedef struct session_guard {
 } session_guard;
 
 /* Saves the calling thread's settings, then sets the default floating-point environment and fixed team sizes. */
-void session_guard_begin(session_guard *guard);
+void session_guard_save_settings(session_guard *guard);
 
 /* Restores the saved settings, including exception flags. */
-void session_guard_end(const session_guard *guard);
+void session_guard_restore_settings(const session_guard *guard);
 
-/* Between session_guard_suspend() and session_guard_resume(), the calling thread has the caller's floating-point
- * environment. OpenMP starts threads in a parallel region between these calls, so that the new threads inherit the
- * caller's environment, as if the caller had started them. Both functions must be called between session_guard_begin()
- * and session_guard_end(). */
-void session_guard_suspend(const session_guard *guard);
-void session_guard_resume(void);
+/* Between session_guard_set_caller_fenv() and session_guard_set_default_fenv(), the calling thread has the caller's
+ * floating-point environment. OpenMP starts threads in a parallel region between these calls, so that the new threads
+ * inherit the caller's environment, as if the caller had started them. Both functions must be called between
+ * session_guard_save_settings() and session_guard_restore_settings(). */
+void session_guard_set_caller_fenv(const session_guard *guard);
+void session_guard_set_default_fenv(void);
 
 #endif

@@ -16,7 +16,7 @@ int session_decode_rank_with_warnings(int word, const session_team *team)
     return word ? team->ranks - word : -1;
 }
 
-insitu_status session_share_warnings(session_report *report, int root, const session_team *team, base_error *error)
+insitu_status session_broadcast_warnings(session_report *report, int root, const session_team *team, base_error *error)
 {
     const char *lines = team->rank == root && report->own_warnings.size ? report->own_warnings.data : "";
     char line[MOST_BYTES];

@@ -16,6 +16,6 @@ int session_decode_rank_with_warnings(int word, const session_team *team);
 
 /* Adds the warnings of the rank `root` to the reports of all ranks. Warnings of the other ranks are dropped, because
  * they are mostly the same as those of `root`. Collective. */
-insitu_status session_share_warnings(session_report *report, int root, const session_team *team, base_error *error);
+insitu_status session_broadcast_warnings(session_report *report, int root, const session_team *team, base_error *error);
 
 #endif

@@ -99,7 +99,7 @@ void session_report_free(session_report *report)
 
 /* ---- warnings ------------------------------------------------------------------------------------------------ */
 
-static uint64_t warning_key(const session_warning *w)
+static uint64_t hash_warning(const session_warning *w)
 {
     const char *const texts[2] = {w->image ? w->image : "", w->mesh ? w->mesh : ""};
     const int numbers[2] = {(int)w->kind, w->number};
@@ -111,7 +111,7 @@ static uint64_t warning_key(const session_warning *w)
 
 /* Returns the index of the first hash in the sorted array `reported` that is not less than `key`, the hash of a
  * warning; reported_count if all are less. */
-static int find_reported(const session_report *report, uint64_t key)
+static int find_reported_warning(const session_report *report, uint64_t key)
 {
     int begin = 0, end = report->reported_count;
     while (begin < end) {
@@ -124,14 +124,14 @@ static int find_reported(const session_report *report, uint64_t key)
     return begin;
 }
 
-static bool reported_key_is_at(const session_report *report, int at, uint64_t key)
+static bool is_reported_key_at(const session_report *report, int at, uint64_t key)
 {
     return at < report->reported_count && report->reported[at] == key;
 }
 
 /* Inserts a warning's hash `key` into the sorted array of reported warnings at index `at`. If memory runs out, the hash
  * is not stored, so that the warning will be reported again. */
-static void add_reported(session_report *report, int at, uint64_t key)
+static void add_reported_warning(session_report *report, int at, uint64_t key)
 {
     const int count = report->reported_count;
     if (count == report->reported_capacity) {
@@ -146,7 +146,7 @@ static void add_reported(session_report *report, int at, uint64_t key)
     report->reported_count++;
 }
 
-static void remove_reported(session_report *report, int at)
+static void remove_reported_warning(session_report *report, int at)
 {
     const int behind = --report->reported_count - at;
     memmove(report->reported + at, report->reported + at + 1, (size_t)behind * sizeof *report->reported);
@@ -155,9 +155,9 @@ static void remove_reported(session_report *report, int at)
 static void add_warning(session_report *report, session_text *text, const session_warning *warning, bool holds,
                         const char *format, va_list arguments)
 {
-    const uint64_t key = warning_key(warning);
-    const int at = find_reported(report, key);
-    const bool is_reported = reported_key_is_at(report, at, key);
+    const uint64_t key = hash_warning(warning);
+    const int at = find_reported_warning(report, key);
+    const bool is_reported = is_reported_key_at(report, at, key);
     if (holds && !is_reported) {
         char line[1024];
 #pragma GCC diagnostic push
@@ -165,9 +165,9 @@ static void add_warning(session_report *report, session_text *text, const sessio
         vsnprintf(line, sizeof line, format, arguments);
 #pragma GCC diagnostic pop
         session_text_add(text, "%s", line);
-        add_reported(report, at, key);
+        add_reported_warning(report, at, key);
     } else if (!holds && is_reported) {
-        remove_reported(report, at);
+        remove_reported_warning(report, at);
     }
 }
 
@@ -189,8 +189,8 @@ void session_warn_locally(session_report *report, const session_warning *warning
 
 bool session_has_reported_warning(const session_report *report, const session_warning *warning)
 {
-    const uint64_t key = warning_key(warning);
-    return reported_key_is_at(report, find_reported(report, key), key);
+    const uint64_t key = hash_warning(warning);
+    return is_reported_key_at(report, find_reported_warning(report, key), key);
 }
 
 void session_clear_reported_warnings(session_report *report)

@@ -24,7 +24,7 @@ typedef struct session_report {
     insitu_report public_report; /* the report that the caller reads; its texts are set at the end of a step */
     /* the texts to which the members of public_report with the same names point after session_report_end() */
     session_text copied_why, left_out, warnings, pieces;
-    /* warnings that only this rank has found; session_share_warnings() sends those of one rank to all ranks */
+    /* warnings that only this rank has found; session_broadcast_warnings() sends those of one rank to all ranks */
     session_text own_warnings;
     /* reported_count: number of warnings in `reported`; reported_capacity: number of warnings for which it has space */
     int reported_count, reported_capacity;
@@ -95,7 +95,7 @@ typedef struct session_warning {
 
 /* Adds the warning if its condition holds and it has not been reported yet. session_warn() is for conditions that are
  * the same on every rank. session_warn_locally() is for conditions that may differ between ranks;
- * session_share_warnings() sends these warnings to all ranks. Local. */
+ * session_broadcast_warnings() sends these warnings to all ranks. Local. */
 void session_warn_locally(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)

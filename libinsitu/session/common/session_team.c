@@ -39,7 +39,7 @@ static void find_rank_placement(session_team *team, MPI_Comm node)
     team->is_round_robin = all[2];
 }
 
-void session_team_find_nodes(session_team *team)
+void session_team_find_node_layout(session_team *team)
 {
     MPI_Comm node = MPI_COMM_NULL;
     team->node_ranks = 1;

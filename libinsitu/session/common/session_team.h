@@ -29,7 +29,7 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
 
 /* Determines the number of ranks on this rank's node, its share of the cores, and how ranks are placed on nodes.
  * Collective. */
-void session_team_find_nodes(session_team *team);
+void session_team_find_node_layout(session_team *team);
 
 /* Frees the communicators. MPI must not have been finalized. Collective. */
 void session_team_free(session_team *team);

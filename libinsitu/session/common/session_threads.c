@@ -100,7 +100,7 @@ typedef struct trial {
     void *spare_memory;
 } trial;
 
-static void *wait_at_gate(void *gate)
+static void *wait_until_unlocked(void *gate)
 {
     pthread_mutex_lock(gate);
     pthread_mutex_unlock(gate);
@@ -155,7 +155,7 @@ static void start_trial_threads(trial *t, int requested)
     /* new threads inherit the blocked signals, so that signals sent to the caller's process never reach them */
     pthread_sigmask(SIG_SETMASK, &all, &old);
     while (t->count < requested &&
-           pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)
+           pthread_create(&t->threads[t->count], &attributes, wait_until_unlocked, &t->exit_mutex) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     pthread_attr_destroy(&attributes);
@@ -245,7 +245,7 @@ static thread_stack find_least_worker_stack(int threads)
 
 /* Returns the stack size in kB that a thread must have so that `needed` bytes are free: the sum of the bytes in use
  * now, `needed` bytes, and some kB for the operating system. */
-static long long needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
+static long long compute_needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
 {
     enum { SYSTEM_KILOBYTES = 16 };
     return ((needed + stack->total_bytes - stack->free_bytes) >> 10) + SYSTEM_KILOBYTES;
@@ -256,31 +256,31 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
                                   base_error *error)
 {
     const thread_stack own = find_stack_of_thread();
-    session_guard_suspend(guard);
+    session_guard_set_caller_fenv(guard);
     const thread_stack least = find_least_worker_stack(team->threads);
-    session_guard_resume();
+    session_guard_set_default_fenv();
     if (own.free_bytes < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB: expected a "
                   "stack of %lld kB (ulimit -s %lld)",
                   (long long)own.free_bytes >> 10, SESSION_CALLER_STACK >> 10,
-                  needed_stack_kilobytes(&own, SESSION_CALLER_STACK),
-                  needed_stack_kilobytes(&own, SESSION_CALLER_STACK));
+                  compute_needed_stack_kilobytes(&own, SESSION_CALLER_STACK),
+                  compute_needed_stack_kilobytes(&own, SESSION_CALLER_STACK));
     else if (least.free_bytes < SESSION_WORKER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "OpenMP's threads have %lld kB of stack left, a step needs %d kB: expected stacks of %lld kB "
                   "(OMP_STACKSIZE=%lldk)",
                   (long long)least.free_bytes >> 10, SESSION_WORKER_STACK >> 10,
-                  needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
-                  needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
+                  compute_needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
+                  compute_needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
     if (status)
         threads->count = 0; /* marks the threads as not tried, so that the next step tries to start them again */
     return status;
 }
 
-insitu_status session_begin_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
-                                    const session_guard *guard, session_report *report, base_error *error)
+insitu_status session_prepare_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
+                                      const session_guard *guard, session_report *report, base_error *error)
 {
     const int requested = compute_requested_threads(scene_threads, team->cores);
     insitu_status status = is_new ? start_threads_as_trial(threads, requested, team->comm, error) : INSITU_OK;

@@ -34,7 +34,7 @@ bool session_needs_thread_trial(const session_threads *threads, int scene_thread
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If
  * is_new is set (because some rank lacks threads, or the scene was edited), threads are started and their stacks
  * measured; a stack that is too small is an error. Collective. */
-insitu_status session_begin_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
-                                    const session_guard *guard, session_report *report, base_error *error);
+insitu_status session_prepare_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
+                                      const session_guard *guard, session_report *report, base_error *error);
 
 #endif

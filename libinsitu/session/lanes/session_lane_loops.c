@@ -80,7 +80,7 @@ LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type
                      .least_index = g->connectivity.base,
                      .greatest_index = g->vertex_count - 1,
                      .type = type,
-                     .count = grid_type_vertices(type),
+                     .count = grid_type_vertex_count(type),
                      .wide_index = wide_index,
                      .wide_number = wide_number};
     if (g->ghosts) s.ghosts = g->ghosts + cells->first * g->ghosts_stride;

@@ -56,7 +56,7 @@ static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
 /* Lists the nodes of the regular lattice of this order on a simplex, and returns the number of nodes. out: the
  * barycentric coordinates of each node times the order; NULL: nodes are only counted. */
-static int list_nodes(int dimensions, int order, int (*out)[4])
+static int list_simplex_nodes(int dimensions, int order, int (*out)[4])
 {
     int count = 0;
     for (int k = 0; k <= (dimensions > 2 ? order : 0); k++)
@@ -66,7 +66,7 @@ static int list_nodes(int dimensions, int order, int (*out)[4])
     return count;
 }
 
-/* Lists of nodes of a simplex, in the form of list_nodes(). */
+/* Lists of nodes of a simplex, in the form of list_simplex_nodes(). */
 typedef struct node_lists {
     int dimensions, order, count;
     int fine_order, fine_count; /* order of the finer lattice, and number of nodes that it has */
@@ -75,19 +75,19 @@ typedef struct node_lists {
     int (*nodes)[4], (*fine)[4], (*lower)[4];
 } node_lists;
 
-/* Returns the index of a node in the list that list_nodes() makes. node: barycentric coordinates of the node times the
- * order. */
-static int find_node(int dimensions, int order, const int node[4])
+/* Returns the index of a node in the list that list_simplex_nodes() makes. node: barycentric coordinates of the node
+ * times the order. */
+static int find_simplex_node_index(int dimensions, int order, const int node[4])
 {
     int at = node[1];
     for (int j = 0; j < node[2]; j++) at += order - node[3] - j + 1;
-    for (int k = 0; k < node[3]; k++) at += list_nodes(dimensions - 1, order - k, NULL);
+    for (int k = 0; k < node[3]; k++) at += list_simplex_nodes(dimensions - 1, order - k, NULL);
     return at;
 }
 
 /* Returns the value, at the barycentric coordinates `at`, of the Bernstein polynomial with these exponents; 0 if an
  * exponent is negative. */
-static double bernstein_value(const int exponents[4], const double at[4])
+static double evaluate_bernstein_polynomial(const int exponents[4], const double at[4])
 {
     double value = 1;
     int factor = 0;
@@ -100,20 +100,20 @@ static double bernstein_value(const int exponents[4], const double at[4])
 
 /* Returns the derivative of the Bernstein polynomial with these exponents along the edge from corner 0 to corner axis +
  * 1, at the barycentric coordinates `at`. */
-static double bernstein_slope(int order, const int exponents[4], int axis, const double at[4])
+static double differentiate_bernstein_polynomial(int order, const int exponents[4], int axis, const double at[4])
 {
     int raised[4], lowered[4];
     memcpy(raised, exponents, sizeof raised);
     memcpy(lowered, exponents, sizeof lowered);
     raised[axis + 1]--;
     lowered[0]--;
-    return order * (bernstein_value(raised, at) - bernstein_value(lowered, at));
+    return order * (evaluate_bernstein_polynomial(raised, at) - evaluate_bernstein_polynomial(lowered, at));
 }
 
 /* Computes the values of all Bernstein polynomials (if axis is negative) or their derivatives along an axis, at the
  * nodes of the cell's lattice or, if is_fine is set, of the finer lattice. `out` has one row per node and one column
  * per polynomial. */
-static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *out)
+static void evaluate_bernstein_basis(const node_lists *lists, int axis, bool is_fine, double *out)
 {
     const int rows = is_fine ? lists->fine_count : lists->count, order = is_fine ? lists->fine_order : lists->order;
     double line[NODES_MOST_ORDER + 1];
@@ -125,16 +125,16 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
         if (lists->dimensions == 1 && !is_fine) at[1] = line[node[1]];
         if (lists->dimensions == 1 && !is_fine) at[0] = 1 - at[1];
         for (int n = 0; n < lists->count; n++)
-            *out++ = axis < 0 ? bernstein_value(lists->nodes[n], at)
-                              : bernstein_slope(lists->order, lists->nodes[n], axis, at);
+            *out++ = axis < 0 ? evaluate_bernstein_polynomial(lists->nodes[n], at)
+                              : differentiate_bernstein_polynomial(lists->order, lists->nodes[n], axis, at);
     }
 }
 
 /* Adds a second difference of Bernstein coefficients to out->differences. direction: direction of the difference, in
- * barycentric coordinates; number: its index in list_differences(). lower: index in lists->lower of the node at which
- * the difference is taken. */
-static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
-                           session_bound_factor *out)
+ * barycentric coordinates; number: its index in list_second_differences(). lower: index in lists->lower of the node at
+ * which the difference is taken. */
+static void add_second_difference(const node_lists *lists, int lower, int number, const int direction[4],
+                                  session_bound_factor *out)
 {
     session_second_difference *difference = &out->differences[out->difference_count++];
     *difference = (session_second_difference){.direction = number};
@@ -145,20 +145,21 @@ static void add_difference(const node_lists *lists, int lower, int number, const
             node[a]++;
             node[b]++;
             if (direction[a] * direction[b] == 0) continue;
-            difference->nodes[difference->count] = find_node(lists->dimensions, lists->order, node);
+            difference->nodes[difference->count] = find_simplex_node_index(lists->dimensions, lists->order, node);
             difference->weights[difference->count++] = (a == b ? 1 : 2) * direction[a] * direction[b];
         }
 }
 
 /* Lists the second differences of Bernstein coefficients along the directions of all edges of pieces. In a tet the last
  * direction is that of the diagonals along which octahedra are cut (session_pattern.c). */
-static void list_differences(const node_lists *lists, session_bound_factor *out)
+static void list_second_differences(const node_lists *lists, session_bound_factor *out)
 {
     static const int directions[MOST_DIRECTIONS][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0}, {0, -1, 1, 0}, {-1, 0, 0, 1},
                                                        {0, -1, 0, 1}, {0, 0, -1, 1}, {-1, -1, 1, 1}};
-    const int count = list_nodes(lists->dimensions, lists->order - 2, lists->lower);
+    const int count = list_simplex_nodes(lists->dimensions, lists->order - 2, lists->lower);
     for (int n = 0; n < count; n++)
-        for (int d = 0; d < direction_counts[lists->dimensions]; d++) add_difference(lists, n, d, directions[d], out);
+        for (int d = 0; d < direction_counts[lists->dimensions]; d++)
+            add_second_difference(lists, n, d, directions[d], out);
 }
 
 static double *make_matrix(int rows, int columns)
@@ -168,7 +169,7 @@ static double *make_matrix(int rows, int columns)
 
 /* Multiplies a matrix whose columns belong to Bernstein coefficients by of->bernstein, so that its columns belong to
  * values at the cell's nodes. spare: working memory of the matrix's size. */
-static void convert_columns(const session_bound_factor *of, int level, double *matrix, double *spare)
+static void convert_bernstein_columns_to_nodal(const session_bound_factor *of, int level, double *matrix, double *spare)
 {
     const int rows = of->fine_counts[level], columns = of->node_count;
     for (int r = 0; r < rows; r++)
@@ -182,15 +183,15 @@ static void convert_columns(const session_bound_factor *of, int level, double *m
 
 /* Computes the matrices from values at the cell's nodes to values and derivatives at the nodes of one level's
  * lattice. */
-static bool fill_level(node_lists *lists, int level, int order, session_bound_factor *out)
+static bool make_finer_lattice_matrices(node_lists *lists, int level, int order, session_bound_factor *out)
 {
     const int dimensions = lists->dimensions, count = lists->count;
     lists->fine_order = order;
-    lists->fine_count = out->fine_counts[level] = list_nodes(dimensions, order, NULL);
+    lists->fine_count = out->fine_counts[level] = list_simplex_nodes(dimensions, order, NULL);
     lists->fine = base_alloc((size_t)lists->fine_count * sizeof *lists->fine);
     double *spare = make_matrix(lists->fine_count, count);
     bool is_made = lists->fine && spare;
-    if (is_made) list_nodes(dimensions, order, lists->fine);
+    if (is_made) list_simplex_nodes(dimensions, order, lists->fine);
     for (int a = -1; a < dimensions && is_made; a++) {
         double *matrix = make_matrix(lists->fine_count, count);
         if (a < 0)
@@ -198,8 +199,8 @@ static bool fill_level(node_lists *lists, int level, int order, session_bound_fa
         else
             out->slopes[level][a] = matrix;
         is_made = matrix;
-        if (is_made) fill_basis(lists, a, true, matrix);
-        if (is_made) convert_columns(out, level, matrix, spare);
+        if (is_made) evaluate_bernstein_basis(lists, a, true, matrix);
+        if (is_made) convert_bernstein_columns_to_nodal(out, level, matrix, spare);
     }
     base_free(spare);
     base_free(lists->fine);
@@ -208,7 +209,7 @@ static bool fill_level(node_lists *lists, int level, int order, session_bound_fa
 
 /* Computes out->bernstein, the matrix from values at the cell's nodes to Bernstein coefficients, and lists the second
  * differences of these coefficients. */
-static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
+static bool make_bernstein_matrix(const node_lists *lists, session_bound_factor *out)
 {
     const int count = lists->count;
     double *spare = make_matrix(count, count);
@@ -216,31 +217,31 @@ static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
     out->differences = base_alloc((size_t)count * MOST_DIRECTIONS * sizeof *out->differences);
     const bool is_made = spare && out->bernstein && out->differences;
     if (is_made) {
-        fill_basis(lists, -1, false, spare);
+        evaluate_bernstein_basis(lists, -1, false, spare);
         for (int n = 0; n < count; n++) out->bernstein[n * count + n] = 1;
         session_invert_matrix(count, spare, out->bernstein);
-        list_differences(lists, out);
+        list_second_differences(lists, out);
     }
     base_free(spare);
     return is_made;
 }
 
-static bool make_factor(const session_bound *of, int dimensions, bool is_lobatto, session_bound_factor *out)
+static bool make_simplex_matrices(const session_bound *of, int dimensions, bool is_lobatto, session_bound_factor *out)
 {
     const int order = of->nodes.of.order;
     node_lists lists = {.dimensions = dimensions,
                         .order = order,
                         .is_lobatto = is_lobatto,
-                        .count = list_nodes(dimensions, order, NULL)};
+                        .count = list_simplex_nodes(dimensions, order, NULL)};
     out->dimensions = dimensions;
     out->node_count = lists.count;
     lists.nodes = base_alloc((size_t)lists.count * sizeof *lists.nodes);
     lists.lower = base_alloc((size_t)lists.count * sizeof *lists.lower);
     bool is_made = lists.nodes && lists.lower;
-    if (is_made) list_nodes(dimensions, order, lists.nodes);
-    is_made = is_made && fill_bernstein(&lists, out);
+    if (is_made) list_simplex_nodes(dimensions, order, lists.nodes);
+    is_made = is_made && make_bernstein_matrix(&lists, out);
     for (int level = 0; level < of->level_count && is_made; level++)
-        is_made = fill_level(&lists, level, of->levels[level].order, out);
+        is_made = make_finer_lattice_matrices(&lists, level, of->levels[level].order, out);
     base_free(lists.nodes);
     base_free(lists.lower);
     return is_made;
@@ -266,20 +267,20 @@ static int count_factors(int type)
 
 /* Returns a factor of the reference cell: the simplex with this index in the Cartesian product of simplices that the
  * reference cell is. A triangle or tet has the index 0; all other factors are lines. */
-static const session_bound_factor *factor_of(const session_bound *of, int factor)
+static const session_bound_factor *get_simplex_factor(const session_bound *of, int factor)
 {
     return factor == 0 && of->simplex.dimensions ? &of->simplex : &of->line;
 }
 
 /* Lists the finer lattices and the linear pieces between their nodes. The orders of these lattices are multiples of the
  * cell's order. */
-static bool make_levels(session_bound *out)
+static bool list_finer_lattices(session_bound *out)
 {
     const int type = out->lattice.type, p = out->lattice.order;
     bool is_made = true;
     for (int order = p < COARSE ? (COARSE + p - 1) / p * p : p; is_made; order *= 2) {
         if (out->level_count == BOUND_MOST_LEVELS || (out->level_count > 0 && order > FINE)) break;
-        const session_nodes fine = session_complete_nodes(type, order);
+        const session_nodes fine = session_describe_complete_nodes(type, order);
         session_bound_level *level = &out->levels[out->level_count++];
         level->order = order;
         level->count = fine.count;
@@ -294,13 +295,14 @@ bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool
     const bool is_pyramid = of->type == GRID_PYRAMID;
     const int type = is_pyramid ? GRID_HEX : of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
     *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3,
-                           .lattice = session_complete_nodes(type, of->order)};
-    bool is_made = session_map_nodes_to_connectivity(of, order, &out->nodes) && make_levels(out);
+                           .lattice = session_describe_complete_nodes(type, of->order)};
+    bool is_made = session_map_nodes_to_connectivity(of, order, &out->nodes) && list_finer_lattices(out);
     if (is_pyramid && is_made) out->collapse = session_compute_collapse_matrix(of->order);
     is_made = is_made && (out->collapse || !is_pyramid);
     is_lobatto = is_lobatto && !is_pyramid;
-    if (is_box || type == GRID_WEDGE) is_made = is_made && make_factor(out, 1, is_lobatto && is_box, &out->line);
-    if (!is_box) is_made = is_made && make_factor(out, type == GRID_TET ? 3 : 2, false, &out->simplex);
+    if (is_box || type == GRID_WEDGE)
+        is_made = is_made && make_simplex_matrices(out, 1, is_lobatto && is_box, &out->line);
+    if (!is_box) is_made = is_made && make_simplex_matrices(out, type == GRID_TET ? 3 : 2, false, &out->simplex);
     return is_made;
 }
 
@@ -329,7 +331,7 @@ typedef struct bound_job {
     double *fine, *slopes[3];
     /* gradient of the field at each node of the finer lattice; not finite at nodes where the cell is flat */
     double (*gradients)[3];
-    double *work; /* working memory of multiply_by_matrices() */
+    double *work; /* working memory of apply_matrix_along_each_factor() */
     /* bounds of the difference between the polynomials and their linear interpolation if the whole cell is one piece:
      * of the difference's length for positions, and of its absolute value for the field */
     double position_bound, value_bound;
@@ -342,7 +344,7 @@ size_t session_bound_work_size(const session_bound *of)
 }
 
 /* Assigns sections of the working memory `work` to the arrays of the job. */
-static void divide_work(bound_job *job, double *work)
+static void assign_work_arrays(bound_job *job, double *work)
 {
     const size_t nodes = SIZE * (size_t)job->of->lattice.count, fine = SIZE * (size_t)job->of->levels[job->level].count;
     job->nodes = work;
@@ -357,14 +359,14 @@ static void divide_work(bound_job *job, double *work)
 /* Applies matrices[f] along each factor f to an array of tuples of `size` doubles. The factors are the simplices whose
  * Cartesian product the reference cell is. in: one tuple for each node of the cell. out: one tuple for each node of the
  * finer lattice if is_fine is set; otherwise as many tuples as the cell has nodes. */
-static void multiply_by_matrices(const bound_job *job, int size, const double *const matrices[3], bool is_fine,
-                                 const double *in, double *out)
+static void apply_matrix_along_each_factor(const bound_job *job, int size, const double *const matrices[3],
+                                           bool is_fine, const double *in, double *out)
 {
     const int count = count_factors(job->of->lattice.type);
     int inner = size, outer = 1;
-    for (int f = 0; f < count; f++) outer *= factor_of(job->of, f)->node_count;
+    for (int f = 0; f < count; f++) outer *= get_simplex_factor(job->of, f)->node_count;
     for (int f = 0; f < count; f++) {
-        const session_bound_factor *factor = factor_of(job->of, f);
+        const session_bound_factor *factor = get_simplex_factor(job->of, f);
         const int rows = is_fine ? factor->fine_counts[job->level] : factor->node_count;
         double *to = f == count - 1 ? out : job->work + f % 2 * SIZE * job->of->levels[job->level].count;
         outer /= factor->node_count;
@@ -376,7 +378,7 @@ static void multiply_by_matrices(const bound_job *job, int size, const double *c
 
 /* Returns the maximum over a triangle of q, half the sum of B_ij l_i l_j over the pairs of corners, where l_i are
  * barycentric coordinates and a, b and c are the three B_ij. Returns 0 if the maximum is not inside the triangle. */
-static double largest_q_in_triangle(double a, double b, double c)
+static double maximize_quadratic_in_triangle(double a, double b, double c)
 {
     const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
     return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
@@ -385,7 +387,7 @@ static double largest_q_in_triangle(double a, double b, double c)
 /* Returns the maximum over a tet of q, half the sum of B_ij l_i l_j over the pairs of corners, where l_i are
  * barycentric coordinates. Returns 0 if the maximum is not inside the tet. b: B_ij for the pairs of corners 01, 02, 03,
  * 12, 13 and 23. */
-static double largest_q_in_tet(const double b[6])
+static double maximize_quadratic_in_tet(const double b[6])
 {
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
     double inverse[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sum = 0;
@@ -400,8 +402,8 @@ static double largest_q_in_tet(const double b[6])
 }
 
 /* Returns the maximum over a tet, including its faces and edges, of q, half the sum of B_ij l_i l_j over the pairs of
- * corners, where l_i are barycentric coordinates. b: B_ij in the order of largest_q_in_tet(). */
-static double largest_q_in_shape(const double b[6])
+ * corners, where l_i are barycentric coordinates. b: B_ij in the order of maximize_quadratic_in_tet(). */
+static double maximize_quadratic_in_closed_tet(const double b[6])
 {
     static const int faces[4][3] = {{0, 1, 3}, {0, 2, 4}, {1, 2, 5}, {3, 4, 5}};
     double most = 0, least = INFINITY, out = 0;
@@ -410,25 +412,26 @@ static double largest_q_in_shape(const double b[6])
         least = fmin(least, b[i]);
     }
     out = most / 8;
-    for (int f = 0; f < 4; f++) out = fmax(out, largest_q_in_triangle(b[faces[f][0]], b[faces[f][1]], b[faces[f][2]]));
-    return least > 0 ? fmax(out, largest_q_in_tet(b)) : out;
+    for (int f = 0; f < 4; f++)
+        out = fmax(out, maximize_quadratic_in_triangle(b[faces[f][0]], b[faces[f][1]], b[faces[f][2]]));
+    return least > 0 ? fmax(out, maximize_quadratic_in_tet(b)) : out;
 }
 
 /* Returns a bound of u, a polynomial on a simplex minus its linear interpolation, for all shapes that pieces of the
  * simplex have. The edges of pieces are as long as those of the simplex (m = 1 at the top of the file). b: for each
- * direction of edges, in the order of list_differences(), an upper bound of minus the second derivative of u. */
-static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
+ * direction of edges, in the order of list_second_differences(), an upper bound of minus the second derivative of u. */
+static double bound_error_on_simplex(int dimensions, const double b[MOST_DIRECTIONS])
 {
     static const signed char tets[TET_SHAPES][6] = {
         {0, 1, 3, 2, 4, 5}, {1, 2, 6, 0, 4, 3}, {3, 1, 6, 5, 2, 4}, {4, 3, 6, 0, 1, 2}, {2, 4, 6, 5, 3, 1}};
     double out = 0;
     if (dimensions == 1) return fmax(0, b[0] / 8);
     if (dimensions == 2)
-        return fmax(fmax(fmax(0, b[0]), fmax(b[1], b[2])) / 8, largest_q_in_triangle(b[0], b[1], b[2]));
+        return fmax(fmax(fmax(0, b[0]), fmax(b[1], b[2])) / 8, maximize_quadratic_in_triangle(b[0], b[1], b[2]));
     for (int shape = 0; shape < TET_SHAPES; shape++) {
         double of[6];
         for (int i = 0; i < 6; i++) of[i] = b[(int)tets[shape][i]];
-        out = fmax(out, largest_q_in_shape(of));
+        out = fmax(out, maximize_quadratic_in_closed_tet(of));
     }
     return out;
 }
@@ -442,7 +445,8 @@ typedef struct bound_sums {
 /* Adds the bounds of u and of -u for one factor of the reference cell to *sums, where u is the polynomial minus its
  * linear interpolation along this factor only. inner: number of doubles from one coefficient of the factor to the
  * next. */
-static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
+static void add_error_bounds_of_factor(const bound_job *job, const session_bound_factor *factor, int inner,
+                                       bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->lattice.count;
     double above[SIZE][MOST_DIRECTIONS], below[SIZE][MOST_DIRECTIONS];
@@ -461,36 +465,37 @@ static void add_factor(const bound_job *job, const session_bound_factor *factor,
             }
         }
     for (int c = 0; c < SIZE; c++) {
-        sums->above[c] += p * (p - 1) * bound_factor(factor->dimensions, above[c]);
-        sums->below[c] += p * (p - 1) * bound_factor(factor->dimensions, below[c]);
+        sums->above[c] += p * (p - 1) * bound_error_on_simplex(factor->dimensions, above[c]);
+        sums->below[c] += p * (p - 1) * bound_error_on_simplex(factor->dimensions, below[c]);
     }
 }
 
 /* Computes the Bernstein coefficients of tuples of `size` doubles from the tuples at the cell's nodes. Tuples at nodes
  * that a serendipity cell lacks are computed first. */
-static void find_coefficients(const bound_job *job, int size, const double *tuples)
+static void compute_bernstein_coefficients(const bound_job *job, int size, const double *tuples)
 {
     const double *matrices[3];
-    for (int f = 0; f < count_factors(job->of->lattice.type); f++) matrices[f] = factor_of(job->of, f)->bernstein;
-    session_complete_tuples(&job->of->nodes, size, tuples, job->nodes);
+    for (int f = 0; f < count_factors(job->of->lattice.type); f++)
+        matrices[f] = get_simplex_factor(job->of, f)->bernstein;
+    session_fill_complete_cell_tuples(&job->of->nodes, size, tuples, job->nodes);
     if (job->of->collapse) {
         session_multiply_matrix(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size,
                                 job->nodes, job->work);
         memcpy(job->nodes, job->work, (size_t)(job->of->lattice.count * size) * sizeof *job->nodes);
     }
-    multiply_by_matrices(job, size, matrices, false, job->nodes, job->coefficients);
+    apply_matrix_along_each_factor(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
 /* Computes job->position_bound and job->value_bound, the bounds of the difference between the polynomials and their
  * linear interpolation, from the Bernstein coefficients. */
-static void bound_differences(bound_job *job)
+static void bound_interpolation_errors(bound_job *job)
 {
     bound_sums sums = {{0}, {0}};
     double largest[SIZE];
     int inner = SIZE;
     for (int f = 0; f < count_factors(job->of->lattice.type); f++) {
-        add_factor(job, factor_of(job->of, f), inner, &sums);
-        inner *= factor_of(job->of, f)->node_count;
+        add_error_bounds_of_factor(job, get_simplex_factor(job->of, f), inner, &sums);
+        inner *= get_simplex_factor(job->of, f)->node_count;
     }
     for (int c = 0; c < SIZE; c++) largest[c] = fmax(sums.above[c], sums.below[c]);
     job->position_bound = vector3_length(largest);
@@ -500,7 +505,7 @@ static void bound_differences(bound_job *job)
 /* Finds a sphere around the bounding box of the positions' Bernstein coefficients. The sphere contains the cell,
  * because each position in the cell is a weighted mean of these coefficients. Its radius is NaN if a coefficient is not
  * finite. */
-static void find_sphere(const bound_job *job, session_cell_bound *out)
+static void find_bounding_sphere(const bound_job *job, session_cell_bound *out)
 {
     double low[SIZE], high[SIZE], half[3], zero = 0;
     for (int c = 0; c < SIZE; c++) low[c] = high[c] = job->coefficients[c];
@@ -516,7 +521,7 @@ static void find_sphere(const bound_job *job, session_cell_bound *out)
     out->radius = zero == 0 ? vector3_length(half) : NAN;
 }
 
-bool session_is_any_between(const session_isovalues *isovalues, double low, double high)
+bool session_is_any_isovalue_between(const session_isovalues *isovalues, double low, double high)
 {
     for (int i = 0; i < isovalues->count; i++)
         if (isovalues->values[i] >= low && isovalues->values[i] <= high) return true;
@@ -547,13 +552,13 @@ static void find_gradients(bound_job *job)
     const int count = count_factors(of->lattice.type);
     const double *values[3] = {NULL}, *matrices[3];
     int axis = 0;
-    for (int f = 0; f < count; f++) values[f] = factor_of(of, f)->values[job->level];
-    multiply_by_matrices(job, SIZE, values, true, job->nodes, job->fine);
+    for (int f = 0; f < count; f++) values[f] = get_simplex_factor(of, f)->values[job->level];
+    apply_matrix_along_each_factor(job, SIZE, values, true, job->nodes, job->fine);
     for (int f = 0; f < count; f++)
-        for (int a = 0; a < factor_of(of, f)->dimensions; a++, axis++) {
+        for (int a = 0; a < get_simplex_factor(of, f)->dimensions; a++, axis++) {
             memcpy(matrices, values, sizeof matrices);
-            matrices[f] = factor_of(of, f)->slopes[job->level][a];
-            multiply_by_matrices(job, SIZE, matrices, true, job->nodes, job->slopes[axis]);
+            matrices[f] = get_simplex_factor(of, f)->slopes[job->level][a];
+            apply_matrix_along_each_factor(job, SIZE, matrices, true, job->nodes, job->slopes[axis]);
         }
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
@@ -569,7 +574,7 @@ static int count_gradients(const bound_job *job)
 
 /* Returns a lower bound of the length of any weighted mean of the gradients at a piece's corners; 0 if the bound is not
  * positive or not finite. Corners without a gradient are left out. */
-static double least_gradient(const bound_job *job, const int *corners, int count)
+static double compute_least_gradient_length(const bound_job *job, const int *corners, int count)
 {
     const int known = count_gradients(job);
     double mean[3] = {0}, least = INFINITY;
@@ -583,7 +588,7 @@ static double least_gradient(const bound_job *job, const int *corners, int count
 
 /* Computes whether an isosurface may cross the cell (out->is_crossed), and the bound of the isosurfaces' error
  * (out->surface_error), as described at the top of the file. */
-static void bound_isosurface(bound_job *job, session_cell_bound *out)
+static void bound_isosurface_error(bound_job *job, session_cell_bound *out)
 {
     const session_bound_level *level = &job->of->levels[job->level];
     const int p = job->of->nodes.of.order, *corners = level->pieces.piece_positions;
@@ -591,14 +596,14 @@ static void bound_isosurface(bound_job *job, session_cell_bound *out)
     double least = INFINITY;
     find_gradients(job);
     for (int piece = 0; piece < level->pieces.piece_count; piece++) {
-        const int count = grid_type_vertices(level->pieces.types[piece]);
+        const int count = grid_type_vertex_count(level->pieces.types[piece]);
         double low = INFINITY, high = -INFINITY;
         for (int c = 0; c < count; c++) {
             low = fmin(low, job->fine[SIZE * corners[c] + 3]);
             high = fmax(high, job->fine[SIZE * corners[c] + 3]);
         }
-        if (session_is_any_between(job->isovalues, low - between, high + between))
-            least = fmin(least, least_gradient(job, corners, count));
+        if (session_is_any_isovalue_between(job->isovalues, low - between, high + between))
+            least = fmin(least, compute_least_gradient_length(job, corners, count));
         corners += count;
     }
     out->is_crossed = least < INFINITY;
@@ -669,9 +674,9 @@ typedef struct difference_means {
 
 /* Returns the means of u and its square over a simplex, where u is a polynomial of order 2 minus its linear
  * interpolation. second: the second derivative s_ij of u along each edge, from corner i to corner j, in the order of
- * list_differences(). Let l_i be the barycentric coordinates. Then u is half the sum of -s_ij l_i l_j over all edges,
- * and the means of products of the l_i are known. */
-static difference_means find_means(int dimensions, const double *second)
+ * list_second_differences(). Let l_i be the barycentric coordinates. Then u is half the sum of -s_ij l_i l_j over all
+ * edges, and the means of products of the l_i are known. */
+static difference_means compute_error_means_on_simplex(int dimensions, const double *second)
 {
     static const int edge_counts[] = {0, 1, 3, 6};
     /* mean over a simplex of the product l_i l_j of two barycentric coordinates, by the number of dimensions */
@@ -694,8 +699,8 @@ static difference_means find_means(int dimensions, const double *second)
  * interpolation along one factor: one of the simplices whose product the reference cell is (top of the file).
  * coefficients: Bernstein coefficients of a scalar. inner: distance in the array between neighbouring coefficients of
  * the factor. */
-static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,
-                                          const double *coefficients)
+static difference_means compute_error_means_along_factor(const bound_job *job, const session_bound_factor *factor,
+                                                         int inner, const double *coefficients)
 {
     const int p = job->of->nodes.of.order, all = job->of->lattice.count;
     const int directions = direction_counts[factor->dimensions];
@@ -711,7 +716,7 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
                     for (int t = 0; t < of->count; t++)
                         second[n] += p * (p - 1) * of->weights[t] * coefficients[outer + of->nodes[t] * inner + s];
                 }
-                const difference_means own = find_means(factor->dimensions, second);
+                const difference_means own = compute_error_means_on_simplex(factor->dimensions, second);
                 out.mean += own.mean;
                 out.square += own.square;
             }
@@ -724,7 +729,7 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
  * differences of the Bernstein coefficients. It is assumed that the tets into which octahedra are cut have the same
  * shape as the other tets, and that the values of u of the different factors of the reference cell are independent.
  * coefficients: working memory with one number per node. */
-static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
+static double estimate_rms_field_error(const bound_job *job, const double gradient[3], double *coefficients)
 {
     double mean = 0, variance = 0;
     int inner = 1;
@@ -733,8 +738,8 @@ static double mean_difference(const bound_job *job, const double gradient[3], do
         coefficients[i] = tuple[3] - vector3_dot(gradient, tuple);
     }
     for (int f = 0; f < count_factors(job->of->lattice.type); f++) {
-        const session_bound_factor *factor = factor_of(job->of, f);
-        const difference_means own = find_factor_means(job, factor, inner, coefficients);
+        const session_bound_factor *factor = get_simplex_factor(job->of, f);
+        const difference_means own = compute_error_means_along_factor(job, factor, inner, coefficients);
         mean += own.mean;
         variance += own.square - own.mean * own.mean;
         inner *= factor->node_count;
@@ -742,41 +747,42 @@ static double mean_difference(const bound_job *job, const double gradient[3], do
     return sqrt(fmax(0, mean * mean + variance));
 }
 
-bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work)
+bool session_may_isosurface_cross_cell(const session_bound *of, const double *values,
+                                       const session_isovalues *isovalues, double *work)
 {
     bound_job job = {.of = of};
     double low = INFINITY, high = -INFINITY, zero = 0;
-    divide_work(&job, work);
-    find_coefficients(&job, 1, values);
+    assign_work_arrays(&job, work);
+    compute_bernstein_coefficients(&job, 1, values);
     for (int i = 0; i < of->lattice.count; i++) {
         zero += 0 * job.coefficients[i]; /* NaN if a coefficient is not finite */
         low = fmin(low, job.coefficients[i]);
         high = fmax(high, job.coefficients[i]);
     }
     const double rounding = 1e-6 * fmax(fabs(low), fabs(high)), tolerance = isovalues->tolerance + rounding;
-    return zero == 0 && session_is_any_between(isovalues, low - tolerance, high + tolerance);
+    return zero == 0 && session_is_any_isovalue_between(isovalues, low - tolerance, high + tolerance);
 }
 
-session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      int level, double *work)
+session_cell_bound session_bound_cell_errors(const session_bound *of, const double *tuples,
+                                             const session_isovalues *isovalues, int level, double *work)
 {
     bound_job job = {.of = of, .isovalues = isovalues, .level = level};
     session_cell_bound out = {.node_distance = find_node_distance(of, tuples)};
     const int p = of->nodes.of.order;
-    divide_work(&job, work);
-    find_coefficients(&job, SIZE, tuples);
-    find_sphere(&job, &out);
+    assign_work_arrays(&job, work);
+    compute_bernstein_coefficients(&job, SIZE, tuples);
+    find_bounding_sphere(&job, &out);
     out.is_crossed = isfinite(out.radius);
     if (!out.is_crossed) return out;
-    bound_differences(&job);
+    bound_interpolation_errors(&job);
     out.position_error = job.position_bound / (p * p);
     if (isovalues) {
-        bound_isosurface(&job, &out);
+        bound_isosurface_error(&job, &out);
         return out;
     }
     double gradient[3];
     find_mean_gradient(&job, &out, gradient);
-    out.value_error = mean_difference(&job, gradient, job.work) / (p * p);
+    out.value_error = estimate_rms_field_error(&job, gradient, job.work) / (p * p);
     out.volume = find_volume(of, tuples);
     return out;
 }

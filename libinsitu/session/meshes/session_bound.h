@@ -66,8 +66,8 @@ typedef struct session_bound {
     double *collapse;
     int axis_count; /* number of axes of the reference cell, 2 or 3 */
     int level_count;
-    /* the finer lattices, one of which is chosen by the parameter `level` of session_bound_cell(); the order of each is
-     * twice that of the one before */
+    /* the finer lattices, one of which is chosen by the parameter `level` of session_bound_cell_errors(); the order of
+     * each is twice that of the one before */
     session_bound_level levels[BOUND_MOST_LEVELS];
     /* The factors of the reference cell, that is, the simplices whose Cartesian product it is. line: used for each axis
      * of hexes, quads and pyramids and for axis k of wedges; simplex: a triangle in triangles and wedges, a tet in
@@ -91,15 +91,17 @@ typedef struct session_isovalues {
 } session_isovalues;
 
 /* Returns whether any isovalue is in the closed interval from `low` to `high`. */
-bool session_is_any_between(const session_isovalues *isovalues, double low, double high);
+bool session_is_any_isovalue_between(const session_isovalues *isovalues, double low, double high);
 
-/* Returns the number of doubles of working memory that session_may_cross() and session_bound_cell() need. */
+/* Returns the number of doubles of working memory that session_may_isosurface_cross_cell() and
+ * session_bound_cell_errors() need. */
 size_t session_bound_work_size(const session_bound *of);
 
 /* Returns whether a cell may contain a part of an isosurface, with the exact values at its nodes or with these values
  * rounded to float32. Returns false if a value is not finite. values: the field at the cell's nodes, in the order of
  * the nodes in connectivity. work: session_bound_work_size() doubles of working memory. */
-bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work);
+bool session_may_isosurface_cross_cell(const session_bound *of, const double *values,
+                                       const session_isovalues *isovalues, double *work);
 
 /* Bounds of the errors of one cell that is drawn as linear pieces between its own nodes. Lengths are in units of
  * coordinates. If each edge between two nodes is cut into n pieces instead, position_error, surface_error and
@@ -126,7 +128,7 @@ typedef struct session_cell_bound {
  * in connectivity. isovalues: NULL if only the bounds of positions and values are needed. level: index in of->levels of
  * the finer lattice to use; a finer one mostly gives a smaller bound, but takes longer. work: session_bound_work_size()
  * doubles of working memory. */
-session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      int level, double *work);
+session_cell_bound session_bound_cell_errors(const session_bound *of, const double *tuples,
+                                             const session_isovalues *isovalues, int level, double *work);
 
 #endif

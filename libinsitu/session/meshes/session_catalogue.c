@@ -57,7 +57,7 @@ static part_summary summarize_parts(const session_parts *parts)
         const bool has_cells = part->given.cell_count > 0, has_ids = part->given.vertex_ids.data != NULL;
         out.is_given = out.is_given || part->is_given || part->problem.status;
         out.has_cells = out.has_cells || has_cells;
-        out.is_refined = out.is_refined || session_has_levels(&part->given);
+        out.is_refined = out.is_refined || session_has_refinement_level(&part->given);
         if (has_cells && !has_ids) out.has_ids = false;
         has_any = has_any || has_ids;
     }
@@ -175,7 +175,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
 
 /* The hash includes the errors of fields on all of this rank's parts. A rank with such an error therefore has another
  * hash than ranks without it, so that the tables are exchanged and all ranks receive the error. */
-uint64_t session_hash_names(const session_meshes *meshes)
+uint64_t session_hash_mesh_table(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < meshes->count;) {
@@ -669,14 +669,14 @@ static insitu_status update_mesh_group(session_mesh_group *mesh_group, const ses
     if (!session_list_mesh_group_parts(mesh_group, meshes, &parts))
         session_fail_for_memory(error, meshes->count * (int64_t)sizeof *parts.items, "homes of meshes");
     const insitu_status status =
-        session_homes_find(&mesh_group->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
+        session_compute_home_ranks(&mesh_group->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
     if (status) mesh_group->positions_hash = 0;
     session_mesh_group_parts_free(&parts);
     return status;
 }
 
-insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
-                                   const session_team *team, base_error *error)
+insitu_status session_update_home_ranks(session_catalogue *catalogue, const session_meshes *meshes,
+                                        double half_diagonal, const session_team *team, base_error *error)
 {
     insitu_status status = INSITU_OK;
     if (!catalogue->are_hashes_known) status = update_mesh_hashes(catalogue, meshes, team, error);
@@ -684,8 +684,8 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         const session_parts parts = session_find_parts(meshes, mesh->name);
         if (!mesh->homes.is_computed)
-            status = session_homes_find(&mesh->homes, (const session_mesh *const *)parts.items, parts.count,
-                                        mesh->has_ids, half_diagonal, team, error);
+            status = session_compute_home_ranks(&mesh->homes, (const session_mesh *const *)parts.items, parts.count,
+                                                mesh->has_ids, half_diagonal, team, error);
     }
     for (int i = 0; i < catalogue->mesh_group_count && !status; i++)
         status = update_mesh_group(catalogue->mesh_groups[i], meshes, half_diagonal, team, error);

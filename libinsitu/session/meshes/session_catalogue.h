@@ -164,18 +164,18 @@ typedef struct session_catalogue {
 } session_catalogue;
 
 /* Builds the catalogue from the tables of all ranks. is_shared: all ranks have the same meshes and fields (equal
- * session_hash_names()), and no mesh or field has an error; the tables are then not exchanged. Meshes with an error are
- * excluded from the step. Collective. */
+ * session_hash_mesh_table()), and no mesh or field has an error; the tables are then not exchanged. Meshes with an
+ * error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
 /* Computes the home ranks (session_homes.h) of meshes and mesh groups again if their cells or positions have changed.
  * half_diagonal: half of the diagonal of the scene's bounds. Collective; all ranks return the same status. */
-insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
-                                   const session_team *team, base_error *error);
+insitu_status session_update_home_ranks(session_catalogue *catalogue, const session_meshes *meshes,
+                                        double half_diagonal, const session_team *team, base_error *error);
 /* Marks the home ranks as unknown. This must be called on all ranks if cells have changed on any rank;
- * session_update_homes() then finds out which meshes have changed. Local. */
+ * session_update_home_ranks() then finds out which meshes have changed. Local. */
 void session_invalidate_homes(session_catalogue *catalogue);
 
 /* Returns whether some mesh has cells of higher order on any rank. */
@@ -218,7 +218,7 @@ void session_vertex_groups_free(session_vertex_groups *groups);
 
 /* Returns a hash of this rank's table of meshes and fields, a text with their names and properties
  * (session_catalogue.c). Two ranks with equal tables have equal hashes. Local. */
-uint64_t session_hash_names(const session_meshes *meshes);
+uint64_t session_hash_mesh_table(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. derived: index of the field
  * among the scene's derived fields. Returns NULL if memory runs out. */

@@ -16,12 +16,12 @@ const signed char *session_vertex_permutation(insitu_vertex_order order, int typ
     return NULL;
 }
 
-bool session_is_reordered(const insitu_mesh *given)
+bool session_must_reorder_vertices(const insitu_mesh *given)
 {
-    if (given->cell_count == 0 || session_has_owners(given)) return false;
+    if (given->cell_count == 0 || session_has_face_owners(given)) return false;
     if (given->cell_types.data) return given->vertex_order != INSITU_ORDER_VTK;
     const int type = (int)given->cell_type;
-    const bool has_gaps = given->connectivity_row && given->connectivity_row != grid_type_vertices(type);
+    const bool has_gaps = given->connectivity_row && given->connectivity_row != grid_type_vertex_count(type);
     return has_gaps || session_vertex_permutation(given->vertex_order, type);
 }
 
@@ -46,9 +46,9 @@ typedef struct cell_rows {
 
 static int64_t read_entry(const cell_rows *rows, int64_t i)
 {
-    return grid_array_index(rows->connectivity, rows->row_length == rows->used_length
-                                                    ? i
-                                                    : i / rows->used_length * rows->row_length + i % rows->used_length);
+    return grid_read_index(rows->connectivity, rows->row_length == rows->used_length
+                                                   ? i
+                                                   : i / rows->used_length * rows->row_length + i % rows->used_length);
 }
 
 static cell_rows make_cell_rows(const session_mesh *mesh)
@@ -57,7 +57,7 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     cell_rows rows = {&mesh->cells.connectivity, given->connectivity_count, 1, 1};
     if (!given->connectivity_row) return rows;
     rows.row_length = given->connectivity_row;
-    rows.used_length = grid_type_vertices((int)given->cell_type);
+    rows.used_length = grid_type_vertex_count((int)given->cell_type);
     rows.count = given->cell_count * rows.used_length;
     return rows;
 }
@@ -83,21 +83,21 @@ static bool do_entries_fit_in_32_bits(const cell_rows *rows, int threads)
 
 /* Finds the entry of the copied connectivity with the cell's first vertex. count: number of the cell's vertices;
  * entries: total number of entries. Returns false if the cell's offsets are invalid. */
-static bool locate_cell(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
+static bool find_first_entry_of_cell(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
 {
     *first = cell * count;
     if (!g->offsets.data) return true;
-    *first = grid_array_index(&g->offsets, cell);
+    *first = grid_read_index(&g->offsets, cell);
     return *first >= 0 && *first <= entries - count && grid_offset_end(&g->offsets, cell) - *first == count;
 }
 
 static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)
 {
-    const int type = grid_cell_type(&mesh->cells, cell), count = grid_type_vertices(type);
+    const int type = grid_cell_type(&mesh->cells, cell), count = grid_type_vertex_count(type);
     const signed char *turn = session_vertex_permutation(mesh->given.vertex_order, type);
     int64_t vertices[GRID_MAX_CELL_VERTICES], first;
-    if (!turn || !locate_cell(&mesh->cells, cell, count, entries, &first)) return;
-    for (int i = 0; i < count; i++) vertices[i] = grid_array_index(out, first + turn[i]);
+    if (!turn || !find_first_entry_of_cell(&mesh->cells, cell, count, entries, &first)) return;
+    for (int i = 0; i < count; i++) vertices[i] = grid_read_index(out, first + turn[i]);
     for (int i = 0; i < count; i++) session_store_index(out, first + i, vertices[i]);
 }
 

@@ -6,7 +6,7 @@
 #include "session_mesh.h"
 
 /* Returns whether session_order_cells() must copy any cells. */
-bool session_is_reordered(const insitu_mesh *given);
+bool session_must_reorder_vertices(const insitu_mesh *given);
 
 /* Returns a table with one entry for each vertex of a cell in VTK's order: the vertex's position in the given order.
  * Returns NULL if the given order equals VTK's for this type of cell. Each of these permutations is its own inverse. */

@@ -80,7 +80,7 @@ static bool reserve_edges(edge_buffer *buffer, int64_t count)
 
 static bool is_finite_vertex(const grid *g, int64_t vertex, double position[3])
 {
-    grid_vertex(g, vertex, position);
+    grid_read_vertex_position(g, vertex, position);
     return isfinite(position[0]) && isfinite(position[1]) && isfinite(position[2]);
 }
 
@@ -93,7 +93,7 @@ static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_fault
         return FACE_BAD_OFFSETS;
     if (details->end - details->first < 3) return FACE_TOO_SMALL;
     for (int64_t i = details->first; i < details->end; i++) {
-        details->vertex = grid_array_index(&g->face_connectivity, i);
+        details->vertex = grid_read_index(&g->face_connectivity, i);
         if (details->vertex < 0 || details->vertex >= g->vertex_count) return FACE_BAD_VERTEX;
         if (!is_ghost && !is_finite_vertex(g, details->vertex, details->position)) return FACE_BAD_COORDINATE;
     }
@@ -102,9 +102,9 @@ static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_fault
 
 static int64_t add_edges(const grid *g, const face_fault_details *details, face_edge *edges, int64_t count)
 {
-    int64_t from = grid_array_index(&g->face_connectivity, details->end - 1);
+    int64_t from = grid_read_index(&g->face_connectivity, details->end - 1);
     for (int64_t i = details->first; i < details->end; i++) {
-        const int64_t to = grid_array_index(&g->face_connectivity, i);
+        const int64_t to = grid_read_index(&g->face_connectivity, i);
         if (from != to) edges[count++] = (face_edge){from < to ? from : to, from < to ? to : from, details->face};
         from = to;
     }
@@ -143,7 +143,7 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffe
     details->count = end - first;
     if (details->count < 4) return FACES_TOO_FEW;
     for (int64_t i = first; i < end; i++) {
-        details->face = grid_array_index(&g->connectivity, i);
+        details->face = grid_read_index(&g->connectivity, i);
         const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), details);
         if (fault) return fault;
         if (!reserve_edges(buffer, edges + details->end - details->first)) return FACES_NO_MEMORY;
@@ -152,8 +152,8 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffe
     return check_edges(buffer->edges, edges, details);
 }
 
-static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault,
-                                    const face_fault_details *details, base_error *error)
+static insitu_status report_face_error(const session_mesh *mesh, int64_t cell, face_fault fault,
+                                       const face_fault_details *details, base_error *error)
 {
     const char *name = mesh->label;
     /* index of the first element in the caller's numbering; it is added to all indices and offsets in messages */
@@ -217,7 +217,7 @@ typedef struct fault_details {
 static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int count, fault_details *details)
 {
     for (int i = 0; i < count; i++) {
-        grid_vertex(g, vertices[i], details->position);
+        grid_read_vertex_position(g, vertices[i], details->position);
         details->vertex = vertices[i];
         for (int axis = 0; axis < 3; axis++)
             if (!isfinite(details->position[axis])) return BAD_COORDINATE;
@@ -228,8 +228,8 @@ static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int 
 static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_details *details)
 {
     const grid *g = &mesh->cells;
-    if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
-    details->first = grid_array_index(&g->offsets, cell);
+    if (!grid_may_have_polyhedra(g) || !g->offsets.data) return BAD_TYPE;
+    details->first = grid_read_index(&g->offsets, cell);
     details->end = grid_offset_end(&g->offsets, cell);
     if (details->first < 0 || details->end > mesh->topology.connectivity_count || details->end < details->first)
         return BAD_OFFSETS;
@@ -242,13 +242,13 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_de
 {
     const grid *g = &mesh->cells;
     if (!g->offsets.data) return BAD_TYPE;
-    details->first = grid_array_index(&g->offsets, cell);
+    details->first = grid_read_index(&g->offsets, cell);
     details->end = grid_offset_end(&g->offsets, cell);
     if (details->first < 0 || details->end < details->first || details->end > mesh->given.connectivity_count ||
         details->end - details->first < 3)
         return BAD_OFFSETS;
     for (int64_t i = details->first; i < details->end; i++) {
-        details->vertex = grid_array_index(&g->connectivity, i);
+        details->vertex = grid_read_index(&g->connectivity, i);
         if (details->vertex < 0 || details->vertex >= g->vertex_count) return BAD_INDEX;
         if (!grid_is_ghost(g, cell) && !is_finite_vertex(g, details->vertex, details->position)) return BAD_COORDINATE;
     }
@@ -261,13 +261,13 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer
     details->type = grid_cell_type(g, cell);
     if (details->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, buffer, details);
     if (details->type == GRID_POLYGON) return check_polygon(mesh, cell, details);
-    const int count = grid_type_vertices(details->type);
+    const int count = grid_type_vertex_count(details->type);
     if (count == 0) return BAD_TYPE;
     /* Ghosts of lattices need no check: a ghost that pads the lattice has no vertices, and the vertices of other cells
      * are in range because they are computed. */
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
-        details->first = grid_array_index(&g->offsets, cell);
+        details->first = grid_read_index(&g->offsets, cell);
         details->end = grid_offset_end(&g->offsets, cell);
         if (details->first < 0 || details->end > mesh->topology.connectivity_count || details->end < details->first ||
             details->end - details->first != count)
@@ -288,12 +288,12 @@ static long long read_original_cell_type(const session_mesh *mesh, int64_t cell)
     const grid *g = &mesh->cells;
     if (mesh->conformed.types) {
         const grid_array numbers = session_grid_array(&mesh->original.cell_types);
-        return (long long)grid_array_number(&numbers, cell);
+        return (long long)grid_read_number(&numbers, cell);
     }
     if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
     const grid_array types = {
         .data = g->cell_types, .stride = g->cell_types_stride, .is_wide = true, .is_integer = true};
-    return grid_array_index(&types, cell);
+    return grid_read_index(&types, cell);
 }
 
 static const char *type_name(int type)
@@ -309,7 +309,7 @@ static const char *type_name(int type)
     case GRID_POLYGON: return "polygon";
     default: break;
     }
-    switch (session_corner_type(type)) {
+    switch (session_get_linear_type(type)) {
     case GRID_TET: return "tet of higher order";
     case GRID_HEX: return "hex of higher order";
     case GRID_WEDGE: return "wedge of higher order";
@@ -327,8 +327,8 @@ static const char *original_type_name(const session_mesh *mesh, int64_t cell)
     return type_name(session_caller_type(mesh, cell));
 }
 
-static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_details *details,
-                                      base_error *error)
+static insitu_status report_offset_error(const session_mesh *mesh, int64_t cell, const fault_details *details,
+                                         base_error *error)
 {
     const long long base = mesh->given.index_base, first = details->first + base, next = details->end + base;
     if (details->type == GRID_POLYGON && details->first >= 0 && details->end <= mesh->given.connectivity_count)
@@ -352,7 +352,7 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
     return base_fail(error, INSITU_ERROR_MESH, format, mesh->label, (long long)cell, type_name(details->type), first,
-                     next, grid_type_vertices(details->type));
+                     next, grid_type_vertex_count(details->type));
 #pragma GCC diagnostic pop
 }
 
@@ -367,7 +367,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     const long long base = mesh->given.index_base, at = session_caller_cell(mesh, cell), vertex = details.vertex + base;
     const char *type = original_type_name(mesh, cell);
     switch (fault) {
-    case BAD_FACES: return describe_faces(mesh, cell, details.fault_of_faces, &details.faces, error);
+    case BAD_FACES: return report_face_error(mesh, cell, details.fault_of_faces, &details.faces, error);
     case BAD_TYPE:
         if (details.type == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_MESH,
@@ -377,7 +377,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
             mesh->label, at, read_original_cell_type(mesh, cell));
-    case BAD_OFFSETS: return describe_offsets(mesh, cell, &details, error);
+    case BAD_OFFSETS: return report_offset_error(mesh, cell, &details, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex index %lld is outside %lld..%lld (index_base is %lld)",
@@ -388,7 +388,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                          mesh->label, at, type, vertex, details.position[0], details.position[1], details.position[2]);
     case CELL_GOOD: break;
     }
-    return describe_faces(mesh, cell, FACES_NO_MEMORY, &details.faces, error);
+    return report_face_error(mesh, cell, FACES_NO_MEMORY, &details.faces, error);
 }
 
 /* Checks the cells begin .. end - 1, which may have any layout, one by one, and adds the valid ones to *tally. Returns
@@ -451,7 +451,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
 static const double largest_coordinate = 1e100;
 
 /* Reports the first drawn cell that has a coordinate above the largest allowed one. */
-static insitu_status describe_far_cell(const session_mesh *mesh, base_error *error)
+static insitu_status report_too_large_coordinate(const session_mesh *mesh, base_error *error)
 {
     const grid *g = &mesh->cells;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -460,7 +460,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             double p[3];
-            grid_vertex(g, vertex, p);
+            grid_read_vertex_position(g, vertex, p);
             if (fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))) > largest_coordinate)
                 return base_fail(
                     error, INSITU_ERROR_MESH,
@@ -476,7 +476,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
 /* Reports an error if a mesh without z coordinates has a drawn cell of a volume type, because such a cell has no
  * volume. The message names the first such cell. Only mixed cells are checked here, because insitu_set_mesh() checks
  * the type of all others. */
-static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
+static insitu_status check_cells_without_z(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
     if (mesh->original.coordinates[2].data || g->lattice || tally->drawn_count == tally->shell_count) return INSITU_OK;
@@ -489,7 +489,7 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
         mesh->label, (long long)session_caller_cell(mesh, cell), original_type_name(mesh, cell));
 }
 
-static bool has_far_coordinates(const mesh_tally *tally)
+static bool has_too_large_coordinates(const mesh_tally *tally)
 {
     bool far = false;
     for (int axis = 0; axis < 3 && tally->drawn_count; axis++)
@@ -537,8 +537,8 @@ static insitu_status check_mesh_cells(session_mesh *mesh, int threads, base_erro
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
     insitu_status status =
-        has_far_coordinates(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
-    if (!status) status = check_plane(mesh, &tally, error);
+        has_too_large_coordinates(&tally) ? report_too_large_coordinate(mesh, error) : check_last_offset(mesh, error);
+    if (!status) status = check_cells_without_z(mesh, &tally, error);
     if (!status) status = update_flat_cells(mesh, tally.flat_count, threads, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
@@ -553,7 +553,7 @@ static insitu_status check_mesh_cells(session_mesh *mesh, int threads, base_erro
     if (mesh->finer.parts)
         mesh->given_counts = mesh->finer.given_counts;
     else if (mesh->topology.is_split)
-        mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
+        mesh->given_counts = session_count_split_cells(mesh, tally.inverted_count > 0);
     /* cells that pad a lattice are not counted as ghosts */
     if (mesh->cells.lattice) mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh);
     mesh->flat_count = tally.flat_count;
@@ -563,7 +563,7 @@ static insitu_status check_mesh_cells(session_mesh *mesh, int threads, base_erro
     return INSITU_OK;
 }
 
-static insitu_status describe_misfit(const session_mesh *mesh, base_error *error)
+static insitu_status report_misaligned_finer_block(const session_mesh *mesh, base_error *error)
 {
     const session_misfit *m = &mesh->misfit;
     const int64_t own = mesh->given.lattice->refinement[m->axis];
@@ -579,7 +579,7 @@ static insitu_status describe_misfit(const session_mesh *mesh, base_error *error
  * arrays in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
-    if (mesh->misfit.exists) return describe_misfit(mesh, error);
+    if (mesh->misfit.exists) return report_misaligned_finer_block(mesh, error);
     if (mesh->warp.problem.status) {
         *error = mesh->warp.problem;
         return error->status;

@@ -22,7 +22,7 @@ typedef struct conform_array {
 } conform_array;
 
 /* Returns the mesh's array with this number, 0 .. SESSION_CONFORMED - 1. */
-static conform_array find_array(insitu_mesh *m, int number)
+static conform_array get_convertible_array(insitu_mesh *m, int number)
 {
     const int64_t open = m->open_offsets ? 0 : 1,
                   most = m->vertex_count > m->face_count ? m->vertex_count : m->face_count;
@@ -105,7 +105,7 @@ static void convert_element(const session_conformed *conformed, const conform_ar
     if (as == type && (of->role != OF_TYPES || !conformed->types)) {
         memcpy(out, p, (size_t)session_type_size(type));
     } else if (of->role == OF_COORDINATES) {
-        const double number = grid_array_number(from, i);
+        const double number = grid_read_number(from, i);
         memcpy(out, &number, sizeof number);
     } else {
         const int64_t whole = read_integer(type, p);
@@ -140,7 +140,7 @@ void session_convert_arrays(session_mesh *mesh, int threads)
     for (int i = 0; i < SESSION_CONFORMED; i++) {
         if (!mesh->conformed.copies[i]) continue;
         bool is_copied;
-        const conform_array of = find_array(&mesh->original, i);
+        const conform_array of = get_convertible_array(&mesh->original, i);
         const insitu_type as = choose_conformed_type(&of, mesh->conformed.types != NULL, &is_copied);
         convert_array(&mesh->conformed, &of, as, threads, mesh->conformed.copies[i]);
     }
@@ -148,7 +148,7 @@ void session_convert_arrays(session_mesh *mesh, int threads)
 
 /* ---- allocating the copies ------------------------------------------------------------------------------------ */
 
-static unsigned char byte_of_type(int type)
+static unsigned char convert_cell_type_to_byte(int type)
 {
     return (unsigned char)(type == (unsigned char)type ? type : GRID_NO_TYPE);
 }
@@ -158,27 +158,27 @@ bool session_has_cell_type_map(const session_mesh *mesh, int count, const int *m
     const session_conformed *conformed = &mesh->conformed;
     if (!conformed->types || !map) return !conformed->types == !map;
     bool is_same = conformed->type_count == count;
-    for (int i = 0; i < count && is_same; i++) is_same = conformed->types[i] == byte_of_type(map[i]);
+    for (int i = 0; i < count && is_same; i++) is_same = conformed->types[i] == convert_cell_type_to_byte(map[i]);
     return is_same;
 }
 
-static bool copy_map(const insitu_mesh *original, session_conformed *out)
+static bool copy_cell_type_map(const insitu_mesh *original, session_conformed *out)
 {
     if (!original->cell_types.data || !original->cell_type_map) return true;
     out->types = base_calloc((size_t)original->cell_type_map_count + 1, 1);
     if (!out->types) return false;
     out->type_count = original->cell_type_map_count;
-    for (int i = 0; i < out->type_count; i++) out->types[i] = byte_of_type(original->cell_type_map[i]);
+    for (int i = 0; i < out->type_count; i++) out->types[i] = convert_cell_type_to_byte(original->cell_type_map[i]);
     return true;
 }
 
-/* If the array that find_array() returns for `number` cannot be read in place, makes the description `given` refer to a
- * copy of it. If is_kept is set, the copy in *last, which was made for the previous description, is used again;
- * otherwise a new one is allocated. Returns false if memory runs out. */
+/* If the array that get_convertible_array() returns for `number` cannot be read in place, makes the description `given`
+ * refer to a copy of it. If is_kept is set, the copy in *last, which was made for the previous description, is used
+ * again; otherwise a new one is allocated. Returns false if memory runs out. */
 static bool replace_array_by_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given,
                                   session_conformed *out)
 {
-    const conform_array of = find_array(given, number);
+    const conform_array of = get_convertible_array(given, number);
     bool is_copied;
     if (!of.array->data) return true;
     const insitu_type as = choose_conformed_type(&of, out->types != NULL, &is_copied);
@@ -203,21 +203,21 @@ insitu_status session_allocate_converted_arrays(session_mesh *mesh, const insitu
 {
     session_conformed made = {0};
     insitu_mesh given = *original;
-    bool is_made = copy_map(original, &made);
+    bool is_made = copy_cell_type_map(original, &made);
     for (int i = 0; i < SESSION_CONFORMED && is_made; i++) {
         const unsigned part = i < 3 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_TOPOLOGY;
         is_made = replace_array_by_copy(&mesh->conformed, !(changed & part), i, &given, &made);
     }
     if (!is_made) {
         const int64_t bytes = made.bytes;
-        session_drop_conformed(&made);
+        session_drop_converted_arrays(&made);
         return session_fail_for_memory(error, bytes, "arrays in other types");
     }
-    session_drop_conformed(&mesh->conformed);
+    session_drop_converted_arrays(&mesh->conformed);
     mesh->conformed = made;
     mesh->original = *original;
     mesh->original.cell_type_map =
-        NULL; /* copy_map() has copied the caller's map, which need not stay valid after the call */
+        NULL; /* copy_cell_type_map() has copied the caller's map, which need not stay valid after the call */
     mesh->given = given;
     mesh->given.cell_type_map = NULL;
     return INSITU_OK;

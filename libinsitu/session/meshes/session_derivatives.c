@@ -139,7 +139,7 @@ static void store_term(term_list *list, int position, double weight)
 /* Adds the terms of a node that a serendipity cell lacks. The value there is a weighted sum of values at other nodes
  * (see the top of this file), so that one term is added for each of these nodes. at: lattice indices of the missing
  * node. weight: the weight of its value in the derivative. */
-static void add_missing_term(term_list *list, const int at[3], double weight)
+static void add_terms_of_missing_node(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
     const int count = session_find_missing_node_directions(list->of->type, at, directions);
@@ -152,23 +152,24 @@ static void add_missing_term(term_list *list, const int at[3], double weight)
         }
         const double share = zeros == 0 ? -0.25 : count == 3 ? 0.25 : 0.5;
         if (zeros < 2)
-            store_term(list, session_node_index(list->of, list->order, node[0], node[1], node[2]), share * weight);
+            store_term(list, session_find_node_in_connectivity(list->of, list->order, node[0], node[1], node[2]),
+                       share * weight);
     }
 }
 
 static void add_term(term_list *list, int i, int j, int k, double weight)
 {
-    const int position = session_node_index(list->of, list->order, i, j, k);
+    const int position = session_find_node_in_connectivity(list->of, list->order, i, j, k);
     if (weight == 0) return;
     if (position < list->of->count)
         store_term(list, position, weight);
     else
-        add_missing_term(list, (const int[]){i, j, k}, weight);
+        add_terms_of_missing_node(list, (const int[]){i, j, k}, weight);
 }
 
 /* Adds the terms of the derivative along an axis of the lattice at the node with the lattice indices `at`. There is one
  * term for each node that determines the polynomial on the line through this node along the axis. */
-static void add_line(term_list *list, const int at[3], int axis)
+static void add_derivative_along_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};
     for (int m = 0; m <= list->order_of_polynomial; m++) {
@@ -180,7 +181,7 @@ static void add_line(term_list *list, const int at[3], int axis)
 /* Adds the terms of the derivative with respect to a barycentric coordinate of a tet or, in layer k of a wedge, of a
  * triangle; the weights are multiplied by `sign`. b: the barycentric coordinates of the node times the order; b[2] is 0
  * in triangles. */
-static void add_barycentric(term_list *list, const int b[4], int coordinate, int k, double sign)
+static void add_barycentric_derivative(term_list *list, const int b[4], int coordinate, int k, double sign)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
     int n[4], most[4]; /* most[m] is the largest n[m] for which B_n is not 0 */
@@ -204,12 +205,12 @@ static void add_derivative(term_list *list, const int at[3], int axis)
     const int p = list->of->order, type = list->of->type;
     const bool is_box = type == GRID_HEX || type == GRID_QUAD;
     if (is_box || (type == GRID_WEDGE && axis == 2)) {
-        add_line(list, at, axis);
+        add_derivative_along_line(list, at, axis);
         return;
     }
     const int depth = type == GRID_TET ? at[2] : 0, b[4] = {at[0], at[1], depth, p - at[0] - at[1] - depth};
-    add_barycentric(list, b, axis, at[2], 1);
-    add_barycentric(list, b, 3, at[2], -1);
+    add_barycentric_derivative(list, b, axis, at[2], 1);
+    add_barycentric_derivative(list, b, 3, at[2], -1);
 }
 
 /* ---- derivatives of cells of one type and number of nodes -------------------------------------------------------- */
@@ -233,7 +234,8 @@ static void list_lattice_indices_of_nodes(const session_nodes *of, insitu_vertex
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
             for (int i = 0; i <= of->order; i++) {
-                const int n = session_has_node(of, i, j, k) ? session_node_index(of, order, i, j, k) : of->count;
+                const int n =
+                    session_has_node(of, i, j, k) ? session_find_node_in_connectivity(of, order, i, j, k) : of->count;
                 if (n < of->count) memcpy(nodes_at[n], (const int[]){i, j, k}, sizeof nodes_at[n]);
             }
 }
@@ -288,7 +290,7 @@ static bool derive_finer_polynomials(const session_mesh *mesh, session_polynomia
         const session_nodes *of = &out->nodal.kinds[i].nodes;
         for (int n = 0; n < 2 && is_made; n++) {
             const int parts = n ? 1 : mesh->finer.parts;
-            const session_nodes fine = session_complete_nodes(of->type, parts * of->order);
+            const session_nodes fine = session_describe_complete_nodes(of->type, parts * of->order);
             if (n == 0) out->refined_counts[i] = fine.count;
             is_made = session_make_derivatives(&fine, out->order, false, parts, &out->kinds[2 * i + n]);
         }
@@ -302,10 +304,10 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
                                  .first_pieces = mesh->topology.first_pieces,
                                  .cell_count = mesh->given.cell_count,
                                  .order = mesh->given.vertex_order};
-    session_list_kinds(&out->rows);
+    session_list_cell_kinds(&out->rows);
     if (mesh->finer.parts) {
         out->nodal = session_describe_caller_rows(&mesh->finer.nodal);
-        session_list_kinds(&out->nodal);
+        session_list_cell_kinds(&out->nodal);
     }
     out->kinds = base_calloc((size_t)ROWS_MOST_KINDS * 2, sizeof *out->kinds);
     bool is_made = out->kinds != NULL;
@@ -334,7 +336,8 @@ static double distance_between(const double *a, const double *b)
 
 /* Returns the mean length of the first and the last of the segments into which the nodes divide each edge of the cell,
  * as a fraction of the mean length of the edges. */
-static double mean_end_segment(const session_nodes *of, insitu_vertex_order order, const double *positions, int stride)
+static double compute_mean_end_segment_length(const session_nodes *of, insitu_vertex_order order,
+                                              const double *positions, int stride)
 {
     const int p = of->order, axes = of->type == GRID_HEX ? 3 : 2;
     double ends = 0, total = 0;
@@ -345,7 +348,7 @@ static double mean_end_segment(const session_nodes *of, insitu_vertex_order orde
             if (axes == 3) node[(axis + 2) % 3] = edge / 2 ? p : 0;
             for (int m = 0; m <= p; m++) {
                 node[axis] = m;
-                const int next = session_node_index(of, order, node[0], node[1], node[2]);
+                const int next = session_find_node_in_connectivity(of, order, node[0], node[1], node[2]);
                 const double length = distance_between(positions + stride * next, positions + stride * last);
                 if (m > 0) total += length;
                 if (m == 1 || m == p) ends += 0.5 * length;
@@ -360,7 +363,8 @@ const session_derivatives *session_find_derivatives_of_cell(const session_polyno
 {
     if (polynomials->nodal.kind_count) {
         const int nodal = session_find_kind_of_cell(&polynomials->nodal, cell);
-        const bool is_refined = session_row_size(&polynomials->rows, cell) == polynomials->refined_counts[nodal];
+        const bool is_refined =
+            session_count_nodes_of_cell(&polynomials->rows, cell) == polynomials->refined_counts[nodal];
         return &polynomials->kinds[2 * nodal + !is_refined];
     }
     const int kind = session_find_kind_of_cell(&polynomials->rows, cell);
@@ -368,5 +372,5 @@ const session_derivatives *session_find_derivatives_of_cell(const session_polyno
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
     if (!session_may_have_lobatto_nodes(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
-    return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
+    return compute_mean_end_segment_length(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

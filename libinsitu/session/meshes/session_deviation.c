@@ -11,7 +11,7 @@ static void read_values(const session_rows *rows, const session_deviation_reques
                         double *tuple, double *out)
 {
     const session_node_values *values = request->values;
-    const int64_t first = session_row_first(rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(rows, cell);
     for (int n = 0; n < count; n++) {
         values->read(values->of,
                      values->is_by_entry ? session_row_entry(rows, cell, n) : session_row_vertex(rows, first + n),
@@ -22,10 +22,10 @@ static void read_values(const session_rows *rows, const session_deviation_reques
 
 static void read_distances(const session_rows *rows, const session_plane *plane, int64_t cell, int count, double *out)
 {
-    const int64_t first = session_row_first(rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(rows, cell);
     for (int n = 0; n < count; n++) {
         double at[3];
-        grid_vertex(&rows->cells, session_row_vertex(rows, first + n), at);
+        grid_read_vertex_position(&rows->cells, session_row_vertex(rows, first + n), at);
         out[n] = 0;
         for (int x = 0; x < 3; x++) out[n] += plane->normal[x] * (at[x] - plane->point[x]);
     }
@@ -52,27 +52,27 @@ typedef struct deviation_work {
 
 /* Returns whether session_make_bound() supports cells with these nodes. The result is also true for linear cells, which
  * have no error. They must be marked if a surface may cross them, since their neighbours may be of higher order. */
-static bool has_bound(const session_nodes *of)
+static bool can_bound_cell_errors(const session_nodes *of)
 {
     return of->order <= (of->type == GRID_PYRAMID ? (int)INTERPOLATION_MOST_PYRAMID : (int)BOUND_MOST_ORDER);
 }
 
-static bool begin_work(const session_mesh *mesh, const session_deviation_request *request, deviation_work *w)
+static bool create_deviation_work(const session_mesh *mesh, const session_deviation_request *request, deviation_work *w)
 {
-    const insitu_mesh *nodal = session_nodal_mesh(mesh);
+    const insitu_mesh *nodal = session_get_mesh_of_caller_nodes(mesh);
     bool is_made = true;
     *w = (deviation_work){.rows = session_describe_caller_rows(nodal),
                           .request = request,
                           .field_size = request->values ? request->values->component_count : 1};
-    session_list_kinds(&w->rows);
+    session_list_cell_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
-        if (has_bound(&w->rows.kinds[i].nodes))
+        if (can_bound_cell_errors(&w->rows.kinds[i].nodes))
             is_made =
                 session_make_bound(&w->rows.kinds[i].nodes, nodal->vertex_order, request->is_lobatto, &w->bounds[i]);
     return is_made;
 }
 
-static void end_work(deviation_work *w)
+static void free_deviation_work(deviation_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++) session_drop_bound(&w->bounds[i]);
 }
@@ -93,7 +93,7 @@ static size_t find_buffer_size(const deviation_work *w)
 /* Returns whether the cell is measured: an isosurface or the plane may cross it, or the request measures cells
  * regardless of crossings. Marks the cell if it may be crossed. If the request has a field or a plane, the values at
  * the cell's nodes are stored in the buffer. */
-static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer)
+static bool may_surface_cross_cell(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer)
 {
     const session_deviation_request *request = w->request;
     const int count = of->nodes.of.count;
@@ -101,26 +101,27 @@ static bool may_cross(const deviation_work *w, const session_bound *of, int64_t 
     if (!request->values && !request->plane) return !request->measured || request->measured[cell];
     session_read_request_values(&w->rows, request, cell, count, buffer, values);
     if (request->is_of_values) return true;
-    if (!session_may_cross(of, values, &request->isovalues, values + 5 * count)) return false;
+    if (!session_may_isosurface_cross_cell(of, values, &request->isovalues, values + 5 * count)) return false;
     if (request->marks) request->marks[cell] = 1;
     return true;
 }
 
-/* Computes the bounds of a cell. If the request has a field, may_cross() must have stored the cell's values in the
- * buffer. */
-static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, int level,
-                                     double *buffer)
+/* Computes the bounds of a cell. If the request has a field, may_surface_cross_cell() must have stored the cell's
+ * values in the buffer. */
+static session_cell_bound bound_errors_of_cell(const deviation_work *w, const session_bound *of, int64_t cell,
+                                               int level, double *buffer)
 {
     const bool has_values = w->request->values != NULL;
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     const int count = of->nodes.of.count;
     double *values = buffer + w->field_size, *tuples = values + count;
     for (int n = 0; n < count; n++) {
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
+        grid_read_vertex_position(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
         tuples[4 * n + 3] = has_values ? values[n] : 0;
     }
     const bool has_isovalues = has_values && !w->request->is_of_values;
-    return session_bound_cell(of, tuples, has_isovalues ? &w->request->isovalues : NULL, level, tuples + 4 * count);
+    return session_bound_cell_errors(of, tuples, has_isovalues ? &w->request->isovalues : NULL, level,
+                                     tuples + 4 * count);
 }
 
 /* Returns the largest surface error that is reported for a cell: half the distance between two nodes, plus the error of
@@ -140,14 +141,14 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
     double least = first->surface_error;
     for (int level = 1; level < of->level_count; level++)
         if (!(least <= enough && least <= find_largest_reported_error(first)))
-            least = fmin(least, bound_cell(w, of, cell, level, buffer).surface_error);
+            least = fmin(least, bound_errors_of_cell(w, of, cell, level, buffer).surface_error);
     return least;
 }
 
-/* Extends the range in *out by the cell's values, which may_cross() has stored in the buffer, and passes the cell to
- * the request's use_cell(). */
-static void measure_values(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer,
-                           session_deviation *out)
+/* Extends the range in *out by the cell's values, which may_surface_cross_cell() has stored in the buffer, and passes
+ * the cell to the request's use_cell(). */
+static void extend_range_by_cell_values(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer,
+                                        session_deviation *out)
 {
     const session_deviation_request *request = w->request;
     const int count = of->nodes.of.count;
@@ -157,7 +158,7 @@ static void measure_values(const deviation_work *w, const session_bound *of, int
         out->high = fmax(out->high, values[n]);
     }
     if (!request->use_cell) return;
-    const session_cell_bound bound = bound_cell(w, of, cell, 0, buffer);
+    const session_cell_bound bound = bound_errors_of_cell(w, of, cell, 0, buffer);
     const session_value_cell read = {count, (const double(*)[4])(values + count), &bound};
     if (bound.is_crossed) request->use_cell(request->of_values, &read);
 }
@@ -181,14 +182,14 @@ static int64_t estimate_area(const session_cell_bound *bound, const session_node
  * computed on the coarsest lattice, and finer lattices can only lower it. They are tried only while the bound exceeds
  * the largest bound of the cells before or find_largest_reported_error(); a smaller bound cannot change the result. The
  * result therefore does not depend on the order of cells. */
-static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
+static void measure_error_of_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_find_kind_of_cell(&w->rows, cell)];
     const session_pixels *pixels = &w->request->pixels;
-    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, buffer)) return;
-    if (w->request->is_of_values) measure_values(w, of, cell, buffer, out);
+    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_surface_cross_cell(w, of, cell, buffer)) return;
+    if (w->request->is_of_values) extend_range_by_cell_values(w, of, cell, buffer, out);
     if (w->request->is_of_values || w->request->marks_only || of->nodes.of.order < 2) return;
-    const session_cell_bound bound = bound_cell(w, of, cell, 0, buffer);
+    const session_cell_bound bound = bound_errors_of_cell(w, of, cell, 0, buffer);
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;
     double error = bound.position_error;
@@ -202,7 +203,7 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, 
     out->error = fmax(out->error, error / size);
 }
 
-static bool measure_cells(const deviation_work *w, int threads, session_deviation *out)
+static bool measure_errors_of_all_cells(const deviation_work *w, int threads, session_deviation *out)
 {
     const int64_t cells = w->rows.cells.cell_count;
     const size_t buffer_size = find_buffer_size(w);
@@ -218,7 +219,7 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
         is_lacking = !buffer;
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (buffer) measure_cell(w, cell, buffer, &own);
+            if (buffer) measure_error_of_cell(w, cell, buffer, &own);
         error = own.error;
         low = own.low;
         high = own.high;
@@ -237,12 +238,12 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     return !is_lacking;
 }
 
-insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
-                                        session_deviation *out, base_error *error)
+insitu_status session_measure_linearization_error(const session_mesh *mesh, const session_deviation_request *request,
+                                                  int threads, session_deviation *out, base_error *error)
 {
     deviation_work *w = base_alloc(sizeof *w);
-    const bool is_made = w && begin_work(mesh, request, w) && measure_cells(w, threads, out);
-    if (w) end_work(w);
+    const bool is_made = w && create_deviation_work(mesh, request, w) && measure_errors_of_all_cells(w, threads, out);
+    if (w) free_deviation_work(w);
     base_free(w);
     if (is_made) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the bound of its cells of higher order",

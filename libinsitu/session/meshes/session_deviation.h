@@ -70,7 +70,7 @@ typedef struct session_deviation {
 /* Measures the caller's cells of a mesh with cells of higher order, except ghosts, and sets the marks of the request.
  * *out contains the results of earlier calls: maxima, minima and sums in it are extended by the cells of this mesh.
  * Parallel. Local. */
-insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
-                                        session_deviation *out, base_error *error);
+insitu_status session_measure_linearization_error(const session_mesh *mesh, const session_deviation_request *request,
+                                                  int threads, session_deviation *out, base_error *error);
 
 #endif

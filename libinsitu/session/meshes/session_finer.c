@@ -33,16 +33,16 @@ typedef struct finer_work {
     int64_t node_count; /* number of nodes of all finer lattices */
 } finer_work;
 
-static void end_work(finer_work *w)
+static void free_finer_work(finer_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++)
         for (int n = 0; n < 2; n++) session_drop_interpolation(&w->kinds[i][n]);
 }
 
-static bool begin_work(const session_finer *finer, const unsigned char *marks, finer_work *w)
+static bool create_finer_work(const session_finer *finer, const unsigned char *marks, finer_work *w)
 {
     *w = (finer_work){.rows = session_describe_caller_rows(&finer->nodal), .finer = finer, .marks = marks};
-    session_list_kinds(&w->rows);
+    session_list_cell_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         for (int n = 0; n < 2 && is_made; n++)
@@ -86,11 +86,11 @@ static void interpolate_cell(const finer_work *w, const session_node_values *val
                              double *out)
 {
     const session_interpolation *of = find_interpolation(w, cell);
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     const int size = values->component_count;
     double corners[8][3];
-    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
+    for (int c = 0; c < grid_type_vertex_count(of->of.type); c++)
+        grid_read_vertex_position(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
     for (int n = 0; n < of->of.count; n++)
         values->read(values->of,
                      values->is_by_entry ? session_row_entry(&w->rows, cell, n)
@@ -122,10 +122,10 @@ insitu_status session_interpolate_values(const session_mesh *mesh, const session
                                          double *out, base_error *error)
 {
     finer_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(&mesh->finer, NULL, w);
+    bool is_made = w && create_finer_work(&mesh->finer, NULL, w);
     if (is_made) w->node_count = mesh->finer.fine.vertex_count;
     is_made = is_made && interpolate_cells(w, values, threads, out);
-    if (w) end_work(w);
+    if (w) free_finer_work(w);
     base_free(w);
     if (is_made) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the interpolation in cells", mesh->label);
@@ -135,7 +135,7 @@ insitu_status session_interpolate_values(const session_mesh *mesh, const session
 
 static void read_vertex(const void *of, int64_t position, double *tuple)
 {
-    grid_vertex(of, position, tuple);
+    grid_read_vertex_position(of, position, tuple);
 }
 
 /* Computes the number of nodes of the finer lattices. Unless all cells are refined and of one kind, also stores the
@@ -162,7 +162,7 @@ static bool number_nodes(finer_work *w, session_finer *finer)
 }
 
 /* Describes the finer cells by an insitu_mesh, as if the caller had passed them. */
-static void describe_cells(const finer_work *w, session_finer *finer)
+static void describe_finer_cells(const finer_work *w, session_finer *finer)
 {
     insitu_mesh *fine = &finer->fine;
     *fine = finer->nodal;
@@ -187,7 +187,7 @@ static void describe_cells(const finer_work *w, session_finer *finer)
 static bool make_cells(session_finer *finer, const unsigned char *marks, int threads)
 {
     finer_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(finer, marks, w) && number_nodes(w, finer);
+    bool is_made = w && create_finer_work(finer, marks, w) && number_nodes(w, finer);
     if (is_made) {
         const session_node_values positions = {&w->rows.cells, false, 3, read_vertex};
         const size_t bytes = 3 * (size_t)w->node_count * sizeof *finer->coordinates;
@@ -195,8 +195,8 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
         finer->bytes += (int64_t)bytes;
         is_made = finer->coordinates && interpolate_cells(w, &positions, threads, finer->coordinates);
     }
-    if (is_made) describe_cells(w, finer);
-    if (w) end_work(w);
+    if (is_made) describe_finer_cells(w, finer);
+    if (w) free_finer_work(w);
     base_free(w);
     return is_made;
 }
@@ -210,34 +210,34 @@ static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
-void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh)
+void session_free_finer_lattices_of_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     if (!mesh->finer.parts) return;
     mesh->given = mesh->finer.nodal;
-    session_drop_finer(&mesh->finer);
+    session_drop_finer_lattices(&mesh->finer);
     drop_node_data(meshes, mesh);
 }
 
-void session_end_finer_lattices(session_meshes *meshes)
+void session_free_finer_lattices(session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
-        session_end_finer_mesh(meshes, meshes->items[i]);
+        session_free_finer_lattices_of_mesh(meshes, meshes->items[i]);
         meshes->items[i]->given.vertex_ids = meshes->items[i]->original.vertex_ids;
     }
 }
 
 /* Returns whether the existing finer lattices have exactly the refined cells and the linear pieces that `marks`
  * selects. marks: NULL selects all cells and pieces. */
-static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
+static bool has_same_refined_cells(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
     session_rows rows = session_describe_caller_rows(&finer->nodal);
     int counts[ROWS_MOST_KINDS];
     bool is_same = true;
-    session_list_kinds(&rows);
+    session_list_cell_kinds(&rows);
     for (int i = 0; i < rows.kind_count; i++) {
         const session_nodes *of = &rows.kinds[i].nodes;
-        counts[i] = session_complete_nodes(of->type, finer->parts * of->order).count;
+        counts[i] = session_describe_complete_nodes(of->type, finer->parts * of->order).count;
     }
     for (int64_t cell = 0; is_same && cell < finer->nodal.cell_count; cell++)
         is_same =
@@ -254,25 +254,26 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
     session_finer made = {.is_counted = true,
                           .parts = choice->parts > 1 || choice->is_completed ? choice->parts : 0,
                           .is_lobatto = choice->is_lobatto,
-                          .sizes = old->parts ? old->sizes : session_get_sizes(mesh),
+                          .sizes = old->parts ? old->sizes : session_get_bounds_and_counts(mesh),
                           .given_counts = mesh->given_counts};
     memcpy(made.counts, old->counts, sizeof made.counts);
-    if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
+    if (old->parts == made.parts &&
+        (!made.parts || (old->is_lobatto == made.is_lobatto && has_same_refined_cells(old, marks))))
         return false;
     unsigned char *outer_faces = mesh->finer.outer_faces;
     mesh->finer.outer_faces = NULL;
-    session_end_finer_mesh(meshes, mesh);
+    session_free_finer_lattices_of_mesh(meshes, mesh);
     mesh->finer.outer_faces = outer_faces;
     if (!made.parts || !session_has_higher_order(&mesh->given)) return true;
     made.nodal = mesh->given;
     if (!make_cells(&made, marks ? marks->cells : NULL, threads)) {
         const int64_t bytes = made.bytes;
-        session_drop_finer(&made);
+        session_drop_finer_lattices(&made);
         session_fail_for_memory(error, bytes, "finer lattices of nodes in cells of higher order");
         return true;
     }
     mesh->finer.outer_faces = NULL;
-    session_drop_finer(&mesh->finer);
+    session_drop_finer_lattices(&mesh->finer);
     made.outer_faces = outer_faces;
     if (marks) {
         made.pieces = marks->pieces;
@@ -301,11 +302,11 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
         const int kind = session_find_kind_of_cell(&of->rows, cell);
         const session_nodes *nodes = &of->rows.kinds[kind].nodes;
-        const int64_t first = session_row_first(&of->rows, cell);
+        const int64_t first = session_find_first_entry_of_cell(&of->rows, cell);
         cells[kind]++;
         if (!session_may_have_lobatto_nodes(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
-            grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), positions[n]);
+            grid_read_vertex_position(&of->rows.cells, session_row_vertex(&of->rows, first + n), positions[n]);
         counts[session_find_derivatives_of_cell(of, cell, positions[0], 3) == &of->kinds[2 * kind] ? EQUISPACED
                                                                                                    : LOBATTO]++;
     }
@@ -313,7 +314,7 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
 
 /* Counts the cells of a part, which must not have finer lattices, and stores the counts in mesh->finer. Returns false
  * if memory runs out. */
-static bool count_mesh(session_mesh *mesh)
+static bool count_higher_order_cells_of_part(session_mesh *mesh)
 {
     session_polynomials polynomials;
     int64_t *counts = mesh->finer.counts;
@@ -342,14 +343,15 @@ static bool count_mesh(session_mesh *mesh)
     return is_made;
 }
 
-static bool sum_counts(const session_meshes *meshes, const char *name, int64_t sums[SESSION_FINER_COUNTS])
+static bool sum_higher_order_cell_counts(const session_meshes *meshes, const char *name,
+                                         int64_t sums[SESSION_FINER_COUNTS])
 {
     const session_parts parts = session_find_parts(meshes, name);
     bool is_made = true;
     for (int i = 0; i < parts.count; i++) {
         session_mesh *part = parts.items[i];
         if (!part->is_given || !part->topology.is_split) continue;
-        is_made = is_made && (part->finer.is_counted || count_mesh(part));
+        is_made = is_made && (part->finer.is_counted || count_higher_order_cells_of_part(part));
         for (int n = 0; n < SESSION_FINER_COUNTS; n++) sums[n] += part->finer.counts[n];
     }
     return is_made;
@@ -380,7 +382,7 @@ insitu_status session_count_higher_order_cells(session_meshes *meshes, const ses
     int64_t *sums = base_calloc((size_t)words + 1, sizeof *sums);
     bool is_made = sums != NULL;
     for (int m = 0; m < catalogue->mesh_count && is_made; m++)
-        is_made = sum_counts(meshes, catalogue->meshes[m].name, sums + m * SESSION_FINER_COUNTS);
+        is_made = sum_higher_order_cell_counts(meshes, catalogue->meshes[m].name, sums + m * SESSION_FINER_COUNTS);
     if (!is_made) session_fail_for_memory(error, words * (int64_t)sizeof *sums, "counts of cells of higher order");
     insitu_status status = session_agree(comm, error);
     if (!status)
@@ -421,11 +423,11 @@ void session_free_choices(session_finer_choice *choices, int count)
 /* Adds to *out the number of bytes of the finer lattices of `cells` cells in which each edge between two nodes is cut
  * into `parts` parts. out->own: 24 bytes for the coordinates of each node, 4 for each vertex of a piece, and 4 for each
  * piece to store the index of its cell; out->per_component: 8 bytes for the value at each node. */
-static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
+static void add_finer_lattice_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
     const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;
-    const int64_t fine = session_complete_nodes(nodes->type, (int)m).count;
-    out->own += cells * (pieces * 4 * (grid_type_vertices(nodes->type) + 1) + fine * 24);
+    const int64_t fine = session_describe_complete_nodes(nodes->type, (int)m).count;
+    out->own += cells * (pieces * 4 * (grid_type_vertex_count(nodes->type) + 1) + fine * 24);
     out->per_component += cells * fine * 8;
 }
 
@@ -435,13 +437,13 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
     const insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
     session_rows rows = session_describe_caller_rows(nodal);
     int64_t counts[ROWS_MOST_KINDS][2] = {{0}};
-    session_list_kinds(&rows);
+    session_list_cell_kinds(&rows);
     for (int64_t cell = 0; cell < nodal->cell_count; cell++)
         counts[session_find_kind_of_cell(&rows, cell)][marks && !marks[cell]]++;
     for (int i = 0; i < rows.kind_count; i++)
         for (int parts = 2; parts <= FINER_MOST_PARTS; parts++) {
-            add_bytes(&rows.kinds[i].nodes, parts, counts[i][0], &out[parts]);
-            add_bytes(&rows.kinds[i].nodes, 1, counts[i][1], &out[parts]);
+            add_finer_lattice_bytes(&rows.kinds[i].nodes, parts, counts[i][0], &out[parts]);
+            add_finer_lattice_bytes(&rows.kinds[i].nodes, 1, counts[i][1], &out[parts]);
         }
 }
 

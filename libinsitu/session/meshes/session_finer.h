@@ -89,10 +89,10 @@ insitu_status session_make_finer_lattices(session_meshes *meshes, const session_
                                           base_error *error);
 
 /* Frees the finer lattices of one mesh. The session then reads the caller's cells of this mesh again. Local. */
-void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh);
+void session_free_finer_lattices_of_mesh(session_meshes *meshes, session_mesh *mesh);
 
 /* Frees the finer lattices of all meshes. The session then reads the caller's cells and vertex ids again. Local. */
-void session_end_finer_lattices(session_meshes *meshes);
+void session_free_finer_lattices(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */
 typedef struct session_node_values {

@@ -42,12 +42,13 @@ static int64_t sample_quantile(const session_mesh *mesh, const session_team *tea
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
     const int64_t vertices = mesh->given.vertex_count, count = vertices < MOST_SAMPLES ? vertices : MOST_SAMPLES;
     int64_t samples[MOST_SAMPLES];
-    for (int64_t i = 0; i < count; i++) samples[i] = grid_array_index(&ids, i * vertices / count);
+    for (int64_t i = 0; i < count; i++) samples[i] = grid_read_index(&ids, i * vertices / count);
     qsort(samples, (size_t)count, sizeof *samples, compare_ids);
     return samples[(int64_t)((team->rank + 0.5) / team->ranks * (double)count)];
 }
 
-static void add_part(rank_part *part, const session_mesh *mesh, bool by_id, double margin, const session_team *team)
+static void extend_box_and_ids_by_part(rank_part *part, const session_mesh *mesh, bool by_id, double margin,
+                                       const session_team *team)
 {
     if (!mesh || !mesh->is_given || !mesh->drawn_count) return;
     for (int axis = 0; axis < 3; axis++) {
@@ -116,12 +117,12 @@ static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int r
     return has_memory;
 }
 
-insitu_status session_homes_find(session_homes *homes, const session_mesh *const *meshes, int count, bool by_id,
-                                 double half_diagonal, const session_team *team, base_error *error)
+insitu_status session_compute_home_ranks(session_homes *homes, const session_mesh *const *meshes, int count, bool by_id,
+                                         double half_diagonal, const session_team *team, base_error *error)
 {
     session_homes found = {.is_computed = true, .by_id = by_id, .rank = team->rank};
     rank_part own = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, 0, 0};
-    for (int i = 0; i < count; i++) add_part(&own, meshes[i], by_id, 2e-5 * half_diagonal, team);
+    for (int i = 0; i < count; i++) extend_box_and_ids_by_part(&own, meshes[i], by_id, 2e-5 * half_diagonal, team);
     rank_part *parts = base_alloc((size_t)team->ranks * sizeof *parts);
     if (!parts) session_fail_for_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
     insitu_status status = session_agree(team->comm, error);
@@ -169,7 +170,7 @@ static bool are_in_box(const session_box *box, const double (*points)[3], int co
     return true;
 }
 
-int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
+int session_find_home_rank(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
 {
     int among = 0;
     if (homes->by_id) return find_home_of_id(homes, id);

@@ -50,8 +50,9 @@ void session_homes_free(session_homes *homes);
  * rank's `count` parts of these meshes; an entry is NULL if this rank has no part of that mesh. by_id is allowed only
  * for a single mesh. half_diagonal: half of the diagonal of the scene's bounds. Collective; all ranks return the same
  * status. */
-insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
-                                 double half_diagonal, const struct session_team *team, base_error *error);
+insitu_status session_compute_home_ranks(session_homes *homes, const struct session_mesh *const *meshes, int count,
+                                         bool by_id, double half_diagonal, const struct session_team *team,
+                                         base_error *error);
 
 /* Returns whether the point lies inside the box or on its border. */
 bool session_is_in_box(const session_box *box, const double point[3]);
@@ -62,6 +63,6 @@ bool session_is_in_other_box(const session_homes *homes, const double point[3]);
 /* Returns the home rank of an item. points: positions of the item's vertices (at least one), which lie in this rank's
  * box. id: smallest global id of the item's vertices, used if homes->by_id is set. hash: hash of the item, which
  * selects the home otherwise. */
-int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
+int session_find_home_rank(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
 
 #endif

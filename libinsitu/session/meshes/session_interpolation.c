@@ -32,7 +32,7 @@
 
 static int find_lexicographic_index(const session_nodes *of, const int at[3])
 {
-    return session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
+    return session_find_node_in_connectivity(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
 }
 
 /* ---- weights of interpolation ---------------------------------------------------------------------------------- */
@@ -82,7 +82,7 @@ static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
 /* ---- weights of pyramids ---- */
 
 /* Returns the Legendre polynomial of order n, for t from 0 to 1. */
-static double find_legendre(int n, double t)
+static double evaluate_shifted_legendre_polynomial(int n, double t)
 {
     double before = 0, value = 1;
     for (int m = 0; m < n; m++) {
@@ -110,7 +110,8 @@ static void fill_pyramid_basis(int p, const double at[3], double *out)
             double scale = 1;
             for (int m = 0; m < most; m++) scale *= rest;
             for (int k = 0; k <= p - most; k++)
-                *out++ = find_legendre(i, x) * find_legendre(j, y) * scale * find_legendre(k, at[2]);
+                *out++ = evaluate_shifted_legendre_polynomial(i, x) * evaluate_shifted_legendre_polynomial(j, y) *
+                         scale * evaluate_shifted_legendre_polynomial(k, at[2]);
         }
 }
 
@@ -118,7 +119,7 @@ static void fill_pyramid_basis(int p, const double at[3], double *out)
  * the apex: one row per node, one column per function. */
 static void fill_collapsed_hex_basis(int p, double *out)
 {
-    const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
+    const int columns = session_describe_complete_nodes(GRID_PYRAMID, p).count;
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++, out += columns) {
@@ -129,9 +130,9 @@ static void fill_collapsed_hex_basis(int p, double *out)
 
 /* Fills a matrix with the pyramid's basis functions at all nodes of a pyramid of order n: one row per node, one column
  * per function. p: order of the basis. */
-static void fill_pyramid_rows(int p, int n, double *out)
+static void evaluate_pyramid_basis_at_nodes(int p, int n, double *out)
 {
-    const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
+    const int columns = session_describe_complete_nodes(GRID_PYRAMID, p).count;
     for (int k = 0; k <= n; k++)
         for (int j = 0; j <= n - k; j++)
             for (int i = 0; i <= n - k; i++, out += columns)
@@ -141,16 +142,16 @@ static void fill_pyramid_rows(int p, int n, double *out)
 /* Converts values of a pyramid's basis functions into weights of the pyramid's nodes. Before the call, each row has the
  * values of the basis functions at a point. Afterwards it has the weights with which the values at the pyramid's nodes
  * are summed to give the value at this point. Returns false if memory runs out. */
-static bool convert_rows(int p, int count, double *rows)
+static bool convert_basis_values_to_weights(int p, int count, double *rows)
 {
-    const int size = session_complete_nodes(GRID_PYRAMID, p).count;
+    const int size = session_describe_complete_nodes(GRID_PYRAMID, p).count;
     const size_t squares = (size_t)size * (size_t)size, bytes = (size_t)count * (size_t)size * sizeof *rows;
     double *basis = base_alloc(squares * sizeof *basis), *inverse = base_calloc(squares, sizeof *inverse);
     double *copy = base_alloc(bytes);
     const bool is_made = basis && inverse && copy;
     if (is_made) {
         for (int n = 0; n < size; n++) inverse[n * size + n] = 1;
-        fill_pyramid_rows(p, p, basis);
+        evaluate_pyramid_basis_at_nodes(p, p, basis);
         session_invert_matrix(size, basis, inverse);
         memcpy(copy, rows, bytes);
         session_multiply_matrix(copy, count, size, 1, size, inverse, rows);
@@ -165,17 +166,18 @@ static bool convert_rows(int p, int count, double *rows)
  * one row per finer node, one column per node of the pyramid. Returns false if memory runs out. */
 static bool fill_pyramid_weights(int p, int parts, double *out)
 {
-    fill_pyramid_rows(p, parts * p, out);
-    return convert_rows(p, session_complete_nodes(GRID_PYRAMID, parts * p).count, out);
+    evaluate_pyramid_basis_at_nodes(p, parts * p, out);
+    return convert_basis_values_to_weights(p, session_describe_complete_nodes(GRID_PYRAMID, parts * p).count, out);
 }
 
 double *session_compute_collapse_matrix(int p)
 {
-    const int columns = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
+    const int columns = session_describe_complete_nodes(GRID_PYRAMID, p).count,
+              rows = session_describe_complete_nodes(GRID_HEX, p).count;
     double *out = base_alloc((size_t)rows * (size_t)columns * sizeof *out);
     if (!out) return NULL;
     fill_collapsed_hex_basis(p, out);
-    if (convert_rows(p, rows, out)) return out;
+    if (convert_basis_values_to_weights(p, rows, out)) return out;
     base_free(out);
     return NULL;
 }
@@ -184,7 +186,8 @@ double *session_compute_collapse_matrix(int p)
 
 static size_t count_weights(int type, int p, int parts)
 {
-    return (size_t)session_complete_nodes(type, parts * p).count * (size_t)session_complete_nodes(type, p).count;
+    return (size_t)session_describe_complete_nodes(type, parts * p).count *
+           (size_t)session_describe_complete_nodes(type, p).count;
 }
 
 static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, session_interpolation *out)
@@ -204,7 +207,7 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
 
 /* Finds out->positions and out->corners, the positions of all nodes and of the corners in the cell's list of nodes in
  * the connectivity. */
-static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
+static void find_nodes_in_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     const int p = of->order;
     for (int k = 0; k <= p; k++)
@@ -212,7 +215,7 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
             for (int i = 0; i <= p; i++)
                 if (session_has_node(of, i, j, k))
                     out->positions[find_lexicographic_index(&out->complete, (const int[]){i, j, k})] =
-                        session_node_index(of, order, i, j, k);
+                        session_find_node_in_connectivity(of, order, i, j, k);
     session_find_corners(of, order, out->corners);
 }
 
@@ -238,7 +241,7 @@ static side_axes find_side_axes(const session_shape *shape, const signed char *s
 
 /* Lists the nodes of a face or an edge, row by row along its axes. out: receives the lexicographic index of each node
  * in the lattice `of`. */
-static void list_side(const session_nodes *of, const side_axes *axes, int corner_count, int *out)
+static void list_nodes_of_side(const session_nodes *of, const side_axes *axes, int corner_count, int *out)
 {
     const int p = of->order;
     for (int j = 0; j <= (corner_count > 2 ? p : 0); j++)
@@ -262,7 +265,7 @@ static void add_side(session_interpolation_sides *sides, const signed char *corn
     memcpy(sides->corners[sides->count++], corners, (size_t)sides->corner_count);
 }
 
-static bool list_sides(session_interpolation *out, session_interpolation_sides *sides)
+static bool list_nodes_of_equal_sides(session_interpolation *out, session_interpolation_sides *sides)
 {
     const session_shape *shape = session_get_cell_shape(out->of.type);
     sides->turn_count = sides->corner_count == 2 ? 2 : 2 * sides->corner_count;
@@ -275,13 +278,13 @@ static bool list_sides(session_interpolation *out, session_interpolation_sides *
     for (int list = 0; list < lists; list++) {
         const side_axes axes = find_side_axes(shape, sides->corners[list / sides->turn_count], sides->corner_count,
                                               list % sides->turn_count);
-        list_side(&out->complete, &axes, sides->corner_count, sides->nodes + list * sides->node_count);
-        list_side(&out->fine, &axes, sides->corner_count, sides->fine_nodes + list * sides->fine_count);
+        list_nodes_of_side(&out->complete, &axes, sides->corner_count, sides->nodes + list * sides->node_count);
+        list_nodes_of_side(&out->fine, &axes, sides->corner_count, sides->fine_nodes + list * sides->fine_count);
     }
     return true;
 }
 
-static bool list_all_sides(session_interpolation *out)
+static bool list_nodes_of_all_sides(session_interpolation *out)
 {
     const session_shape *shape = session_get_cell_shape(out->of.type);
     session_interpolation_sides *quads = &out->sides[0], *triangles = &out->sides[1], *edges = &out->sides[2];
@@ -290,12 +293,13 @@ static bool list_all_sides(session_interpolation *out)
     edges->corner_count = 2;
     for (int f = 0; f < shape->face_count; f++) add_side(shape->faces[f][3] < 0 ? triangles : quads, shape->faces[f]);
     for (int e = 0; e < shape->edge_count; e++) add_side(edges, shape->edges[e]);
-    return list_sides(out, quads) && list_sides(out, triangles) && list_sides(out, edges);
+    return list_nodes_of_equal_sides(out, quads) && list_nodes_of_equal_sides(out, triangles) &&
+           list_nodes_of_equal_sides(out, edges);
 }
 
 /* Returns whether, along an axis, node `parts * i` of the finer lattice coincides with node i of the cell; it may not
  * if the cell's nodes are Gauss-Lobatto points. */
-static bool is_own_position(const session_interpolation *of, int parts, int i)
+static bool is_finer_node_at_cell_node(const session_interpolation *of, int parts, int i)
 {
     const double *row = of->line + parts * i * (of->of.order + 1);
     for (int m = 0; m <= of->of.order; m++)
@@ -305,15 +309,15 @@ static bool is_own_position(const session_interpolation *of, int parts, int i)
 
 /* Lists the cell's nodes that coincide with a node of the finer lattice. If the cell's nodes are equispaced, these are
  * all of its nodes; otherwise at least its corners. */
-static bool list_own_nodes(session_interpolation *out, int parts)
+static bool list_coinciding_nodes(session_interpolation *out, int parts)
 {
     const int p = out->of.order;
     out->own = base_alloc((size_t)out->complete.count * sizeof *out->own);
     for (int k = 0; k <= p && out->own; k++)
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
-                if (session_has_node(&out->of, i, j, k) && is_own_position(out, parts, i) &&
-                    is_own_position(out, parts, j) && is_own_position(out, parts, k)) {
+                if (session_has_node(&out->of, i, j, k) && is_finer_node_at_cell_node(out, parts, i) &&
+                    is_finer_node_at_cell_node(out, parts, j) && is_finer_node_at_cell_node(out, parts, k)) {
                     int *own = out->own[out->own_count++];
                     own[0] = find_lexicographic_index(&out->complete, (const int[]){i, j, k});
                     own[1] = find_lexicographic_index(&out->fine, (const int[]){parts * i, parts * j, parts * k});
@@ -323,9 +327,9 @@ static bool list_own_nodes(session_interpolation *out, int parts)
 
 bool session_map_nodes_to_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
-    *out = (session_interpolation){.of = *of, .complete = session_complete_nodes(of->type, of->order)};
+    *out = (session_interpolation){.of = *of, .complete = session_describe_complete_nodes(of->type, of->order)};
     out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
-    if (out->positions) find_positions(of, order, out);
+    if (out->positions) find_nodes_in_connectivity(of, order, out);
     return out->positions;
 }
 
@@ -333,8 +337,9 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
                                 session_interpolation *out)
 {
     if (!session_map_nodes_to_connectivity(of, order, out)) return false;
-    out->fine = session_complete_nodes(of->type, parts * of->order);
-    return make_weights(of, parts, is_lobatto, out) && list_all_sides(out) && list_own_nodes(out, parts);
+    out->fine = session_describe_complete_nodes(of->type, parts * of->order);
+    return make_weights(of, parts, is_lobatto, out) && list_nodes_of_all_sides(out) &&
+           list_coinciding_nodes(out, parts);
 }
 
 void session_drop_interpolation(session_interpolation *interpolation)
@@ -358,14 +363,14 @@ typedef struct cell_job {
     const session_interpolation *of;
     int size;        /* number of components */
     double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
-    /* two arrays for intermediate results, with space for spare_count() tuples each */
+    /* two arrays for intermediate results, with space for count_spare_tuples() tuples each */
     double *spare[2];
     double *out;
 } cell_job;
 
 /* Returns the largest number of tuples that an intermediate result has: the number of nodes of the finer lattice or, if
  * it is larger, the sum of the numbers of finer nodes on all quads, on all triangles or on all edges. */
-static int spare_count(const session_interpolation *of)
+static int count_spare_tuples(const session_interpolation *of)
 {
     int most = of->fine.count;
     for (int n = 0; n < INTERPOLATION_SIDES; n++) {
@@ -377,7 +382,7 @@ static int spare_count(const session_interpolation *of)
 
 size_t session_interpolation_work_size(const session_interpolation *of, int components)
 {
-    return ((size_t)of->complete.count + 2 * (size_t)spare_count(of)) * (size_t)components;
+    return ((size_t)of->complete.count + 2 * (size_t)count_spare_tuples(of)) * (size_t)components;
 }
 
 /* Computes one row of the product of a matrix and an array: out[s] is the sum of row[c] * in[c * inner + s] over c, for
@@ -416,7 +421,7 @@ static double neighbour_value(const cell_job *job, const int at[3], const int st
 
 /* Returns the sum of a component's values at two nodes: those with the lattice indices `at` + `step` and `at` -
  * `step`. */
-static double sum_pair(const cell_job *job, const int at[3], const int step[3], int component)
+static double sum_opposite_neighbour_values(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int back[3] = {-step[0], -step[1], -step[2]};
     return neighbour_value(job, at, step, component) + neighbour_value(job, at, back, component);
@@ -425,14 +430,17 @@ static double sum_pair(const cell_job *job, const int at[3], const int step[3], 
 /* Returns the value of one component at the middle of a face of a serendipity cell. at: lattice indices of the middle.
  * a, b: steps in lattice indices from the middle to two midpoints of edges. The bits of the result do not change if a
  * and b are swapped. */
-static double middle_of_face(const cell_job *job, const int at[3], const int a[3], const int b[3], int component)
+static double interpolate_face_centre(const cell_job *job, const int at[3], const int a[3], const int b[3],
+                                      int component)
 {
     const int sum[3] = {a[0] + b[0], a[1] + b[1], a[2] + b[2]}, difference[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return 0.5 * (sum_pair(job, at, a, component) + sum_pair(job, at, b, component)) -
-           0.25 * (sum_pair(job, at, sum, component) + sum_pair(job, at, difference, component));
+    return 0.5 * (sum_opposite_neighbour_values(job, at, a, component) +
+                  sum_opposite_neighbour_values(job, at, b, component)) -
+           0.25 * (sum_opposite_neighbour_values(job, at, sum, component) +
+                   sum_opposite_neighbour_values(job, at, difference, component));
 }
 
-static double middle_of_hex(const cell_job *job, const int at[3], int component)
+static double interpolate_hex_centre(const cell_job *job, const int at[3], int component)
 {
     double edges = 0, corners = 0;
     for (int n = 0; n < 27; n++) {
@@ -450,10 +458,12 @@ static void fill_missing_node(const cell_job *job, const int at[3])
     const int count = session_find_missing_node_directions(job->of->of.type, at, directions);
     double *out = job->lattice + find_lexicographic_index(&job->of->complete, at) * job->size;
     for (int c = 0; c < job->size; c++)
-        out[c] = count == 3 ? middle_of_hex(job, at, c) : middle_of_face(job, at, directions[0], directions[1], c);
+        out[c] = count == 3 ? interpolate_hex_centre(job, at, c)
+                            : interpolate_face_centre(job, at, directions[0], directions[1], c);
 }
 
-void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out)
+void session_fill_complete_cell_tuples(const session_interpolation *of, int components, const double *tuples,
+                                       double *out)
 {
     const cell_job job = {.of = of, .size = components, .lattice = out};
     for (int n = 0; n < of->complete.count; n++)
@@ -496,7 +506,7 @@ static void fill_all_fine_nodes(const cell_job *job)
 }
 
 /* Computes for each corner the number of corners before it in the lexicographic order of positions. */
-static void rank_corners(int count, const double (*corners)[3], int ranks[8])
+static void order_corners_by_position(int count, const double (*corners)[3], int ranks[8])
 {
     for (int c = 0; c < count; c++) ranks[c] = 0;
     for (int c = 0; c < count; c++)
@@ -554,16 +564,16 @@ void session_interpolate(const session_interpolation *of, const double (*corners
                          const double *tuples, double *work, double *out)
 {
     if (of->own_count == of->fine.count) {
-        session_complete_tuples(of, components, tuples, out);
+        session_fill_complete_cell_tuples(of, components, tuples, out);
         return;
     }
     cell_job job = {.of = of, .size = components, .lattice = work, .out = out};
     int ranks[8];
     job.spare[0] = work + of->complete.count * components;
-    job.spare[1] = job.spare[0] + spare_count(of) * components;
-    session_complete_tuples(of, components, tuples, work);
+    job.spare[1] = job.spare[0] + count_spare_tuples(of) * components;
+    session_fill_complete_cell_tuples(of, components, tuples, work);
     fill_all_fine_nodes(&job);
-    rank_corners(session_get_cell_shape(of->of.type)->corner_count, corners, ranks);
+    order_corners_by_position(session_get_cell_shape(of->of.type)->corner_count, corners, ranks);
     for (int n = 0; n < INTERPOLATION_SIDES; n++)
         if (of->sides[n].count > 0) fill_side_nodes(&job, &of->sides[n], ranks);
     for (int n = 0; n < of->own_count; n++)

@@ -69,8 +69,8 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
-/* Fills in only those members of *out that session_complete_tuples() needs; members for the finer lattice remain empty.
- * Returns false if memory runs out. */
+/* Fills in only those members of *out that session_fill_complete_cell_tuples() needs; members for the finer lattice
+ * remain empty. Returns false if memory runs out. */
 bool session_map_nodes_to_connectivity(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
 
 /* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order
@@ -82,7 +82,8 @@ double *session_compute_collapse_matrix(int p);
 /* Copies the tuples at the cell's nodes from the order of the nodes in the connectivity into lexicographic order, and
  * computes the tuples at nodes that a serendipity cell lacks. `out` has one tuple for each node of the complete
  * cell. */
-void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);
+void session_fill_complete_cell_tuples(const session_interpolation *of, int components, const double *tuples,
+                                       double *out);
 
 /* Returns the number of doubles that session_interpolate() needs as working memory. */
 size_t session_interpolation_work_size(const session_interpolation *of, int components);

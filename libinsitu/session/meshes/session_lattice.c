@@ -44,7 +44,7 @@ static bool is_rectilinear(const insitu_lattice *l)
     return l->axes[0].data || l->axes[1].data || l->axes[2].data;
 }
 
-bool session_has_axes(const insitu_mesh *mesh)
+bool session_has_axis_coordinates(const insitu_mesh *mesh)
 {
     return mesh->lattice && (is_uniform(mesh->lattice) || is_rectilinear(mesh->lattice));
 }
@@ -67,7 +67,7 @@ static insitu_status check_cells(const insitu_lattice *l, base_error *error)
 
 /* Sorts the three axes by stride, and stores their indices in `order`. counts: number of elements along each axis. An
  * axis with a single element comes first, because its stride is never used. */
-static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
+static void sort_axes_by_stride(const int64_t strides[3], const int64_t counts[3], int order[3])
 {
     for (int i = 0; i < 3; i++) {
         int at = i;
@@ -86,7 +86,7 @@ static insitu_status check_strides(const char *what, const int64_t strides[3], c
 {
     int order[3];
     int64_t reach = 1; /* 1 plus the largest index that is reached along the axes processed so far */
-    order_axes(strides, counts, order);
+    sort_axes_by_stride(strides, counts, order);
     for (int i = 0; i < 3; i++) {
         const int axis = order[i];
         if (counts[axis] == 1) continue;
@@ -115,7 +115,7 @@ static void compute_packed_strides(const int64_t counts[3], int64_t out[3])
     out[2] = counts[0] * counts[1];
 }
 
-static insitu_status check_numbers(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_vertex_and_cell_strides(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_lattice *l = mesh->lattice;
     int64_t vertices[3], cells[3], packed[3];
@@ -233,15 +233,15 @@ insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
         return base_fail(error, INSITU_ERROR_MESH,
                          "lattice: there are no cells along i, j and k, and cell_count is %lld",
                          (long long)mesh->cell_count);
-    status = check_numbers(mesh, error);
+    status = check_vertex_and_cell_strides(mesh, error);
     if (!status) status = check_interior(l, error);
     if (!status) status = check_refinement(l, error);
-    if (!status && session_has_axes(mesh) &&
+    if (!status && session_has_axis_coordinates(mesh) &&
         (mesh->coordinates[0].data || mesh->coordinates[1].data || mesh->coordinates[2].data))
         return base_fail(error, INSITU_ERROR_MESH,
                          "lattice: %s and coordinates of vertices are given: give one of them",
                          is_uniform(l) ? "spacing" : "axes");
-    if (!status && !session_has_axes(mesh) && !mesh->coordinates[0].data && !mesh->coordinates[1].data &&
+    if (!status && !session_has_axis_coordinates(mesh) && !mesh->coordinates[0].data && !mesh->coordinates[1].data &&
         !mesh->coordinates[2].data)
         return base_fail(error, INSITU_ERROR_MESH, "lattice: neither spacing nor axes nor coordinates are given");
     if (!status && is_uniform(l)) status = check_uniform(l, error);
@@ -277,7 +277,7 @@ static grid_numbering make_numbering(const int64_t strides[3], const int64_t cou
 {
     grid_numbering out = {{0}, {0}, {0}, {0}};
     int order[3], above = -1;
-    order_axes(strides, counts, order);
+    sort_axes_by_stride(strides, counts, order);
     for (int i = 2; i >= 0; i--) {
         const int axis = order[i];
         if (counts[axis] == 1) continue;
@@ -335,17 +335,17 @@ void session_set_lattice_of_grid(session_mesh *mesh, grid *g)
     if (!l || are_all_zero(l->cells)) return;
     g->lattice = &mesh->lattice.cells;
     g->cell_type = session_is_quad_lattice(l) ? GRID_QUAD : GRID_HEX;
-    for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
+    for (int axis = 0; axis < 3 && session_has_axis_coordinates(&mesh->given); axis++)
         g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
 }
 
-void session_fill_axis(const insitu_lattice *l, int axis, double *out)
+void session_fill_axis_coordinates(const insitu_lattice *l, int axis, double *out)
 {
     const grid_array given = session_grid_array(&l->axes[axis]);
     for (int64_t n = 0; n < count_vertices_along(l, axis); n++) {
         out[n] = 0;
         if (is_uniform(l)) out[n] = l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + n);
-        if (given.data) out[n] = grid_array_number(&given, n);
+        if (given.data) out[n] = grid_read_number(&given, n);
     }
 }
 
@@ -361,7 +361,7 @@ insitu_status session_compute_axis_coordinates(session_mesh *mesh, base_error *e
         if (!coordinates)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
                              mesh->label, (long long)count, axis_name[axis]);
-        session_fill_axis(l, axis, coordinates);
+        session_fill_axis_coordinates(l, axis, coordinates);
         own->axis_coordinates[axis] = coordinates;
         own->cells.axes[axis].axis_coordinates = coordinates;
         own->bytes += count * (int64_t)sizeof *coordinates;

@@ -11,7 +11,7 @@ insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error);
 bool session_is_quad_lattice(const insitu_lattice *lattice);
 
 /* Returns whether the coordinates are given along a lattice's axes instead of by vertex. */
-bool session_has_axes(const insitu_mesh *mesh);
+bool session_has_axis_coordinates(const insitu_mesh *mesh);
 
 /* Returns the INSITU_CHANGED_* bits for the differences between two lattices, either of which may be NULL. Returns
  * INSITU_CHANGED_ALL if their shapes differ, so that the mesh counts as a new one. */
@@ -26,7 +26,7 @@ void session_copy_lattice(session_mesh *mesh);
 void session_set_lattice_of_grid(session_mesh *mesh, grid *g);
 
 /* Computes the cells[axis] + 1 coordinates along an axis of a lattice that is uniform or rectilinear. Local. */
-void session_fill_axis(const insitu_lattice *lattice, int axis, double *out);
+void session_fill_axis_coordinates(const insitu_lattice *lattice, int axis, double *out);
 
 /* Computes session_lattice.axis_coordinates from the current contents of the caller's arrays. Does nothing if the
  * lattice's coordinates are given by vertex. Fails if a coordinate is not finite. Local. */

@@ -186,7 +186,7 @@ void session_drop_piece_set(session_piece_set *set)
     *set = (session_piece_set){0};
 }
 
-void session_drop_finer(session_finer *finer)
+void session_drop_finer_lattices(session_finer *finer)
 {
     session_drop_piece_set(&finer->pieces);
     base_free(finer->outer_faces);
@@ -206,7 +206,7 @@ void session_drop_axes(session_lattice *lattice)
     lattice->bytes = 0;
 }
 
-void session_drop_conformed(session_conformed *conformed)
+void session_drop_converted_arrays(session_conformed *conformed)
 {
     for (int i = 0; i < SESSION_CONFORMED; i++) base_free(conformed->copies[i]);
     base_free(conformed->types);
@@ -259,7 +259,7 @@ void session_drop_fields(session_mesh *mesh)
     mesh->field_count = 0;
 }
 
-void session_drop_derived(session_mesh *mesh)
+void session_drop_derived_fields(session_mesh *mesh)
 {
     int kept = 0;
     for (int i = 0; i < mesh->field_count; i++) {
@@ -274,10 +274,10 @@ void session_drop_derived(session_mesh *mesh)
     if (kept == mesh->field_count) return;
     mesh->field_count = kept;
     session_drop_scalars(mesh);
-    session_drop_outers(mesh, true);
+    session_drop_outer_surfaces(mesh, true);
 }
 
-void session_drop_outer(session_outer *outer, bool with_faces)
+void session_drop_outer_surface(session_outer *outer, bool with_faces)
 {
     const session_outer last = *outer;
     if (outer->mesh) {
@@ -300,10 +300,10 @@ void session_drop_outer(session_outer *outer, bool with_faces)
     outer->faces = last.faces;
 }
 
-void session_drop_outers(session_mesh *mesh, bool are_cells_new)
+void session_drop_outer_surfaces(session_mesh *mesh, bool are_cells_new)
 {
     for (int i = 0; i < mesh->outer_count; i++) {
-        session_drop_outer(mesh->outers[i], are_cells_new);
+        session_drop_outer_surface(mesh->outers[i], are_cells_new);
         if (are_cells_new) base_free(mesh->outers[i]);
     }
     if (!are_cells_new) return;
@@ -338,7 +338,7 @@ bool session_next_part(session_part_walk *walk)
 /* Frees the data that the session has computed from the cells: outer surfaces, scalars, tree, topology, flat cells. */
 static void drop_derived_data(session_mesh *mesh)
 {
-    session_drop_outers(mesh, true);
+    session_drop_outer_surfaces(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
@@ -361,13 +361,13 @@ void session_mark_moved(session_meshes *meshes, session_mesh *mesh)
     mesh->coordinates_stamp = ++meshes->stamp;
     mesh->is_check_stale = true;
     mesh->discontinuous.is_made = false;
-    session_drop_outers(mesh, false);
+    session_drop_outer_surfaces(mesh, false);
     mesh->is_geometry_stale = true;
     meshes->are_cells_changed = true;
     for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
 }
 
-void session_drop_warp(session_mesh *mesh)
+void session_drop_moved_coordinates(session_mesh *mesh)
 {
     base_free(mesh->warp.coordinate_memory);
     mesh->warp = (session_warp){0};
@@ -383,11 +383,11 @@ void session_drop_mirrored(session_mirrored *mirrored)
 static void drop_cells(session_mesh *mesh)
 {
     drop_derived_data(mesh);
-    session_drop_warp(mesh);
+    session_drop_moved_coordinates(mesh);
     session_drop_mirrored(&mesh->mirrored);
-    session_drop_finer(&mesh->finer);
+    session_drop_finer_lattices(&mesh->finer);
     session_drop_axes(&mesh->lattice);
-    session_drop_conformed(&mesh->conformed);
+    session_drop_converted_arrays(&mesh->conformed);
     base_free(mesh->covered);
     mesh->covered = NULL;
 }
@@ -401,7 +401,7 @@ void session_drop_contents(session_mesh *mesh)
 void session_drop_data_of_invalid_mesh(session_mesh *mesh)
 {
     drop_cells(mesh);
-    session_drop_derived(mesh);
+    session_drop_derived_fields(mesh);
     for (int i = 0; i < mesh->field_count; i++) {
         session_field *field = &mesh->fields[i];
         const char *name = field->given.name;
@@ -560,7 +560,8 @@ session_mesh *session_add_mirror_image(session_meshes *meshes, session_mesh *sou
 static void remove_meshes(session_meshes *meshes, int first, int count)
 {
     for (int i = first; i < first + count; i++) {
-        meshes->are_levels_changed = meshes->are_levels_changed || session_has_levels(&meshes->items[i]->given);
+        meshes->are_levels_changed =
+            meshes->are_levels_changed || session_has_refinement_level(&meshes->items[i]->given);
         free_mesh(meshes->items[i]);
     }
     meshes->count -= count;
@@ -641,7 +642,7 @@ void session_restore_excluded(session_meshes *meshes)
     for (; meshes->excluded_count; meshes->excluded_count--) insert_mesh(meshes, meshes->items[meshes->count]);
 }
 
-bool session_refuse_in_fill(session_meshes *meshes, const char *call)
+bool session_refuse_call_in_fill(session_meshes *meshes, const char *call)
 {
     session_filling *filling = &meshes->filling;
     if (!filling->mesh) return false;

@@ -527,7 +527,7 @@ typedef struct session_parts {
 
 /* Returns the description of a mesh in which cells of higher order have the caller's nodes, even if the session reads
  * finer lattices instead. */
-static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
+static inline const insitu_mesh *session_get_mesh_of_caller_nodes(const session_mesh *mesh)
 {
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
@@ -573,9 +573,9 @@ void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_discontinuous(session_discontinuous *discontinuous);
 void session_drop_piece_set(session_piece_set *set);
-void session_drop_finer(session_finer *finer);
+void session_drop_finer_lattices(session_finer *finer);
 void session_drop_axes(session_lattice *lattice);
-void session_drop_conformed(session_conformed *conformed);
+void session_drop_converted_arrays(session_conformed *conformed);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the session's copies of the tables insitu_field.patches and insitu_field.components. */
@@ -585,16 +585,16 @@ void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
 /* Marks the coordinates of a mesh's vertices as changed. The cells' connectivity must be unchanged. */
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
 /* Frees the moved coordinates, which must not be in use any more. */
-void session_drop_warp(session_mesh *mesh);
+void session_drop_moved_coordinates(session_mesh *mesh);
 void session_drop_mirrored(session_mirrored *mirrored);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
-void session_drop_derived(session_mesh *mesh);
+void session_drop_derived_fields(session_mesh *mesh);
 /* Frees the mesh that is built on the outer faces and, if with_faces, the list of these faces. The threshold is
  * kept. */
-void session_drop_outer(session_outer *outer, bool with_faces);
+void session_drop_outer_surface(session_outer *outer, bool with_faces);
 /* Frees the data of all outer surfaces of a mesh. are_cells_new: also frees the lists of outer faces, and removes the
  * outer surfaces with their thresholds. */
-void session_drop_outers(session_mesh *mesh, bool are_cells_new);
+void session_drop_outer_surfaces(session_mesh *mesh, bool are_cells_new);
 /* Frees all data of the mesh, including its fields; its names and its place in the table remain. */
 void session_drop_contents(session_mesh *mesh);
 /* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
@@ -632,7 +632,7 @@ static inline int64_t session_cell_count(const session_mesh *mesh)
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
 }
 
-static inline session_sizes session_get_sizes(const session_mesh *mesh)
+static inline session_sizes session_get_bounds_and_counts(const session_mesh *mesh)
 {
     const double *low = mesh->lower, *high = mesh->upper;
     return (session_sizes){
@@ -687,16 +687,16 @@ void session_restore_excluded(session_meshes *meshes);
 /* Refuses a public call of the library that the caller's fill function makes, because the call would change data that
  * the step reads. call: name of the called function. Returns whether the call was refused; the error is stored in
  * filling.refused_error, and the step fails with it. Local. */
-bool session_refuse_in_fill(session_meshes *meshes, const char *call);
+bool session_refuse_call_in_fill(session_meshes *meshes, const char *call);
 
 /* Returns whether cells are described by the owners of their faces. */
-static inline bool session_has_owners(const insitu_mesh *mesh)
+static inline bool session_has_face_owners(const insitu_mesh *mesh)
 {
     return mesh->owner.data || mesh->boundary_owner.data;
 }
 
 /* Returns whether the mesh is a block with cells and with a level of refinement. */
-static inline bool session_has_levels(const insitu_mesh *mesh)
+static inline bool session_has_refinement_level(const insitu_mesh *mesh)
 {
     const insitu_lattice *l = mesh->lattice;
     return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);

@@ -73,7 +73,7 @@ bool session_may_lack_z(const insitu_mesh *mesh)
     if (mesh->lattice) return session_is_quad_lattice(mesh->lattice);
     const int type = (int)mesh->cell_type;
     return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type(type) ||
-           grid_is_shell_type(session_corner_type(type));
+           grid_is_shell_type(session_get_linear_type(type));
 }
 
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
@@ -96,7 +96,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
                                           &mesh->boundary_face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
     const int64_t apart = mesh->boundary_face_count;
-    const bool has_lists = mesh->face_lists.data != NULL, has_axes = session_has_axes(mesh);
+    const bool has_lists = mesh->face_lists.data != NULL, has_axes = session_has_axis_coordinates(mesh);
     const int numbers = SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, integers = SESSION_ALLOW_INTEGERS;
     const int any = SESSION_ALLOW_ANY, optional = SESSION_IS_OPTIONAL, closed = SESSION_HAS_END;
     const int end = mesh->open_offsets ? 0 : closed;
@@ -146,7 +146,7 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
  * cells too. */
 static insitu_status check_face_owners(const insitu_mesh *mesh, base_error *error)
 {
-    if (!session_has_owners(mesh)) {
+    if (!session_has_face_owners(mesh)) {
         if (mesh->halo_cell_count)
             return base_fail(error, INSITU_ERROR_MESH, "halo_cell_count is %lld, but owners of faces are not given",
                              (long long)mesh->halo_cell_count);
@@ -204,10 +204,10 @@ static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = session_count_cell_nodes(mesh);
     if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
-    const char *other = session_has_owners(mesh) ? "owners of faces"
-                        : mesh->offsets.data     ? "offsets"
-                        : mesh->cell_types.data  ? "cell types"
-                                                 : NULL;
+    const char *other = session_has_face_owners(mesh) ? "owners of faces"
+                        : mesh->offsets.data          ? "offsets"
+                        : mesh->cell_types.data       ? "cell types"
+                                                      : NULL;
     if (other)
         return base_fail(error, INSITU_ERROR_MESH,
                          "connectivity_row is %lld and %s are given: rows are of cells of one type without offsets",
@@ -232,11 +232,11 @@ static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *e
         return base_fail(error, INSITU_ERROR_ARGUMENT, "order is %d, expected 1..%d, or 0: as the nodes tell",
                          mesh->order, NODES_MOST_ORDER);
     if (mesh->cell_count == 0) return INSITU_OK;
-    const char *other = mesh->lattice              ? "a lattice"
-                        : session_has_owners(mesh) ? "owners of faces"
-                        : mesh->cell_types.data    ? "cell types"
-                        : mesh->offsets.data       ? "offsets"
-                                                   : NULL;
+    const char *other = mesh->lattice                   ? "a lattice"
+                        : session_has_face_owners(mesh) ? "owners of faces"
+                        : mesh->cell_types.data         ? "cell types"
+                        : mesh->offsets.data            ? "offsets"
+                                                        : NULL;
     if (other)
         return base_fail(error, INSITU_ERROR_MESH,
                          "order is %d and %s are given: order is of cells of one Lagrange type without offsets",
@@ -277,9 +277,9 @@ static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *err
                      (int)mesh->vertex_order, why);
 }
 
-static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_cell_description(const insitu_mesh *mesh, base_error *error)
 {
-    if (mesh->cell_count == 0 || session_has_owners(mesh) || mesh->lattice) return INSITU_OK;
+    if (mesh->cell_count == 0 || session_has_face_owners(mesh) || mesh->lattice) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
             return base_fail(error, INSITU_ERROR_MESH, "cell types are given without offsets: mixed cells need both");
@@ -290,8 +290,8 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
     if (mesh->cell_type == INSITU_POLYGON && !mesh->offsets.data)
         return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polygons need them");
     if (mesh->cell_type == INSITU_POLYHEDRON || mesh->cell_type == INSITU_POLYGON) return INSITU_OK;
-    if (session_corner_type((int)mesh->cell_type) != GRID_NO_TYPE) return check_higher_order(mesh, error);
-    const int vertices = grid_type_vertices((int)mesh->cell_type);
+    if (session_get_linear_type((int)mesh->cell_type) != GRID_NO_TYPE) return check_higher_order(mesh, error);
+    const int vertices = grid_type_vertex_count((int)mesh->cell_type);
     if (vertices == 0)
         return base_fail(error, INSITU_ERROR_MESH,
                          "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 triangle, 9 "
@@ -313,7 +313,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_face_lists(mesh, error);
     if (!status) status = check_face_owners(mesh, error);
     if (!status) status = check_lagrange_order(mesh, error);
-    if (!status) status = check_shape(mesh, error);
+    if (!status) status = check_cell_description(mesh, error);
     if (!status) status = check_cell_rows(mesh, error);
     return status;
 }
@@ -364,9 +364,9 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* Called after the caller has set a new description, which is in mesh->given. If cells or coordinates have changed,
  * frees the finer lattices (session_finer.h). Otherwise makes the mesh read them again. */
-static void restore_finer_lattices(session_mesh *mesh, unsigned changed)
+static void reuse_or_drop_finer_lattices(session_mesh *mesh, unsigned changed)
 {
-    if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
+    if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer_lattices(&mesh->finer);
     if (!mesh->finer.parts) return;
     mesh->finer.nodal = mesh->given;
     mesh->given = mesh->finer.fine;
@@ -377,12 +377,12 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
-    const bool had_ids = mesh->original.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
+    const bool had_ids = mesh->original.vertex_ids.data, had_levels = session_has_refinement_level(&mesh->given);
     changed |= find_description_changes(mesh, given);
     if (changed & INSITU_CHANGED_GEOMETRY && (mesh->topology.depends_on_coordinates || mesh->finer.parts))
         changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_allocate_converted_arrays(mesh, given, changed, error)) return;
-    restore_finer_lattices(mesh, changed);
+    reuse_or_drop_finer_lattices(mesh, changed);
     if (drops_fields) {
         session_drop_fields(mesh);
         meshes->are_names_changed = true;
@@ -390,12 +390,12 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
 
     if (changed & INSITU_CHANGED_TOPOLOGY) {
         session_drop_cell_data(meshes, mesh);
-        session_drop_warp(mesh);
+        session_drop_moved_coordinates(mesh);
         base_free(mesh->covered);
         mesh->covered = NULL;
-        meshes->are_levels_changed = meshes->are_levels_changed || had_levels || session_has_levels(given);
+        meshes->are_levels_changed = meshes->are_levels_changed || had_levels || session_has_refinement_level(given);
     }
-    if (had_ids != (given->vertex_ids.data != NULL) || had_levels != session_has_levels(given))
+    if (had_ids != (given->vertex_ids.data != NULL) || had_levels != session_has_refinement_level(given))
         meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
         session_mark_moved(meshes, mesh);
@@ -435,7 +435,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     if (!mesh) mesh = session_add_mesh(meshes, name, block, error);
     if (!mesh) return INSITU_ERROR_MEMORY;
     base_error what = {0};
-    const bool had_levels = session_has_levels(&mesh->given);
+    const bool had_levels = session_has_refinement_level(&mesh->given);
     if (check_mesh(given, &what) == INSITU_OK) session_store_mesh(meshes, mesh, given, &what);
     if (!what.status) return INSITU_OK;
     meshes->are_levels_changed = meshes->are_levels_changed || had_levels;

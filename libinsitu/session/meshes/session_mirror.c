@@ -22,10 +22,10 @@ static bool is_mirrored(const session_mesh *image, int axis)
 
 /* Returns a bit mask of the axes along which the mirror image stores its own coordinates: bit i stands for axis i.
  * These are the mirrored axes, or all axes if the source's coordinates are interleaved or strided. */
-static int find_own_axes(const session_mesh *image)
+static int find_axes_with_own_coordinates(const session_mesh *image)
 {
     enum { IN_PLANE = 3, ALL = 7 };
-    const insitu_mesh *given = session_nodal_mesh(image->source);
+    const insitu_mesh *given = session_get_mesh_of_caller_nodes(image->source);
     bool are_packed = true;
     for (int axis = 0; axis < 3; axis++) {
         const insitu_array *array = &given->coordinates[axis];
@@ -36,19 +36,19 @@ static int find_own_axes(const session_mesh *image)
 }
 
 /* Copies coordinates along an axis without changing their type, and mirrors them if the axis is mirrored. */
-static void mirror_numbers(const session_mesh *image, int axis, int threads)
+static void mirror_coordinates_along_axis(const session_mesh *image, int axis, int threads)
 {
-    const grid_array from = session_coordinates(session_nodal_mesh(image->source), axis);
+    const grid_array from = session_coordinates(session_get_mesh_of_caller_nodes(image->source), axis);
     const double plane = image->mirrored.planes[axis];
     const insitu_array *to = &image->mirrored.coordinates[axis];
-    const int64_t count = session_nodal_mesh(image->source)->vertex_count;
+    const int64_t count = session_get_mesh_of_caller_nodes(image->source)->vertex_count;
     const bool is_copied = !is_mirrored(image, axis);
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < count; v++) {
-            const double coordinate = grid_array_number(&from, v);
+            const double coordinate = grid_read_number(&from, v);
             session_store_coordinate(to, v, is_copied ? coordinate : 2 * plane - coordinate);
         }
         region_leave();
@@ -58,9 +58,9 @@ static void mirror_numbers(const session_mesh *image, int axis, int threads)
 /* Mirrors the coordinates of the source's vertices. Returns false if memory runs out. */
 static bool mirror_vertices(session_mesh *image, int threads)
 {
-    const insitu_mesh *given = session_nodal_mesh(image->source);
+    const insitu_mesh *given = session_get_mesh_of_caller_nodes(image->source);
     session_mirrored *m = &image->mirrored;
-    const int axes = find_own_axes(image);
+    const int axes = find_axes_with_own_coordinates(image);
     insitu_type types[3];
     bool is_new = false;
     for (int axis = 0; axis < 3; axis++)
@@ -69,7 +69,7 @@ static bool mirror_vertices(session_mesh *image, int threads)
                                      &is_new))
         return false;
     for (int axis = 0; axis < 3; axis++)
-        if (axes >> axis & 1) mirror_numbers(image, axis, threads);
+        if (axes >> axis & 1) mirror_coordinates_along_axis(image, axis, threads);
     return true;
 }
 
@@ -84,7 +84,7 @@ static bool mirror_lattice(session_mesh *image)
         if (!m->axes[axis]) m->axes[axis] = base_alloc((size_t)count * sizeof *m->axes[axis]);
         double *coordinates = m->axes[axis];
         if (!coordinates) return false;
-        session_fill_axis(given, axis, coordinates);
+        session_fill_axis_coordinates(given, axis, coordinates);
         for (int64_t n = 0; n < count && is_mirrored(image, axis); n++)
             coordinates[n] = 2 * m->planes[axis] - coordinates[n];
         m->bytes += count * (int64_t)sizeof *coordinates;
@@ -111,7 +111,7 @@ static void describe_lattice(session_mesh *image, insitu_mesh *out)
 static insitu_mesh describe_image(session_mesh *image, unsigned changed)
 {
     const session_mesh *source = image->source;
-    insitu_mesh out = *session_nodal_mesh(source);
+    insitu_mesh out = *session_get_mesh_of_caller_nodes(source);
     out.changed = changed;
     for (int axis = 0; axis < 3; axis++)
         if (image->mirrored.coordinates[axis].data) out.coordinates[axis] = image->mirrored.coordinates[axis];
@@ -137,7 +137,7 @@ static unsigned find_changes(const session_mesh *image, const double planes[3])
 static bool mirror_coordinates(session_mesh *image, const double planes[3], unsigned changed, int threads)
 {
     const session_mesh *source = image->source;
-    const bool has_axes = session_has_axes(session_nodal_mesh(source));
+    const bool has_axes = session_has_axis_coordinates(session_get_mesh_of_caller_nodes(source));
     session_mirrored *m = &image->mirrored;
     if (changed & INSITU_CHANGED_TOPOLOGY || has_axes != (m->axes[0] != NULL)) session_drop_mirrored(m);
     m->bytes = 0;
@@ -158,7 +158,7 @@ session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, 
     base_error problem = {.status = INSITU_OK};
     if (source->is_check_stale) session_convert_arrays(source, threads);
     if (!mirror_coordinates(image, planes, changed, threads))
-        session_fail_for_memory(&problem, session_nodal_mesh(source)->vertex_count * 24,
+        session_fail_for_memory(&problem, session_get_mesh_of_caller_nodes(source)->vertex_count * 24,
                                 "coordinates of a mirrored mesh");
     if (!problem.status) {
         const insitu_mesh description = describe_image(image, changed);

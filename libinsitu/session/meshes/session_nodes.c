@@ -27,7 +27,7 @@ bool session_is_lagrange(int type)
     return type >= INSITU_LAGRANGE_TRIANGLE && type <= INSITU_LAGRANGE_PYRAMID;
 }
 
-int session_corner_type(int type)
+int session_get_linear_type(int type)
 {
     for (int i = 0; i < QUADRATIC_TYPES; i++)
         if (quadratic_types[i].type == type) return quadratic_types[i].corners;
@@ -52,7 +52,7 @@ int64_t session_node_count(int type, int order)
     for (int i = 0; i < QUADRATIC_TYPES; i++)
         if (quadratic_types[i].type == type) return order == 0 || order == 2 ? quadratic_types[i].count : 0;
     if (!session_is_lagrange(type) || order < 1 || order > NODES_MOST_ORDER) return 0;
-    return count_complete_nodes(session_corner_type(type), order);
+    return count_complete_nodes(session_get_linear_type(type), order);
 }
 
 int session_lagrange_type(int corner_type)
@@ -62,14 +62,14 @@ int session_lagrange_type(int corner_type)
     return GRID_NO_TYPE;
 }
 
-session_nodes session_complete_nodes(int corner_type, int order)
+session_nodes session_describe_complete_nodes(int corner_type, int order)
 {
     return (session_nodes){corner_type, order, (int)count_complete_nodes(corner_type, order), true, true};
 }
 
 bool session_describe_nodes(int type, int64_t count, session_nodes *out)
 {
-    const int corners = session_corner_type(type);
+    const int corners = session_get_linear_type(type);
     if (corners == GRID_NO_TYPE) return false;
     for (int order = session_is_lagrange(type) ? 1 : 2; order <= NODES_MOST_ORDER; order++) {
         if (session_node_count(type, order) != count) continue;
@@ -83,7 +83,7 @@ bool session_describe_nodes(int type, int64_t count, session_nodes *out)
 int64_t session_count_cell_nodes(const insitu_mesh *mesh)
 {
     const int type = (int)mesh->cell_type;
-    if (session_corner_type(type) == GRID_NO_TYPE) return grid_type_vertices(type);
+    if (session_get_linear_type(type) == GRID_NO_TYPE) return grid_type_vertex_count(type);
     if (!session_is_lagrange(type)) return session_node_count(type, 0);
     if (mesh->order) return session_node_count(type, mesh->order);
     if (mesh->connectivity_row) return mesh->connectivity_row;
@@ -107,16 +107,16 @@ const char *session_describe_unsupported_node_order(const session_nodes *of, ins
 
 /* Returns the index of a quad's corner in VTK's order. i, j: true if the corner is at the far end of the first or
  * second axis. */
-static int number_quad_corner(bool i, bool j)
+static int find_vtk_index_of_quad_corner(bool i, bool j)
 {
     return i ? (j ? 2 : 1) : (j ? 3 : 0);
 }
 
-static int number_quad_node(int p, int i, int j)
+static int find_vtk_index_of_quad_node(int p, int i, int j)
 {
     const int inner = p - 1;
     const bool at_i = i == 0 || i == p, at_j = j == 0 || j == p;
-    if (at_i && at_j) return number_quad_corner(i, j);
+    if (at_i && at_j) return find_vtk_index_of_quad_corner(i, j);
     if (at_j) return 4 + i - 1 + (j ? 2 * inner : 0);
     if (at_i) return 4 + j - 1 + (i ? inner : 3 * inner);
     return 4 + 4 * inner + i - 1 + inner * (j - 1);
@@ -124,16 +124,16 @@ static int number_quad_node(int p, int i, int j)
 
 /* Returns the index of a hex's node in VTK's order. is_old: in the order of VTK before version 9.1, in which the nodes
  * of two edges along k are swapped. */
-static int number_hex_node(int p, bool is_old, int i, int j, int k)
+static int find_vtk_index_of_hex_node(int p, bool is_old, int i, int j, int k)
 {
     const int r = p - 1;
     const bool at_i = i == 0 || i == p, at_j = j == 0 || j == p, at_k = k == 0 || k == p;
     const int edges = 8, faces = edges + 12 * r, inside = faces + 6 * r * r;
-    if (at_i && at_j && at_k) return number_quad_corner(i, j) + (k ? 4 : 0);
+    if (at_i && at_j && at_k) return find_vtk_index_of_quad_corner(i, j) + (k ? 4 : 0);
     if (at_j && at_k) return edges + i - 1 + (j ? 2 * r : 0) + (k ? 4 * r : 0);
     if (at_i && at_k) return edges + j - 1 + (i ? r : 3 * r) + (k ? 4 * r : 0);
     if (at_i && at_j)
-        return edges + 8 * r + k - 1 + r * (is_old ? (i ? 1 : 0) + (j ? 2 : 0) : number_quad_corner(i, j));
+        return edges + 8 * r + k - 1 + r * (is_old ? (i ? 1 : 0) + (j ? 2 : 0) : find_vtk_index_of_quad_corner(i, j));
     if (at_i) return faces + j - 1 + r * (k - 1) + (i ? r * r : 0);
     if (at_j) return faces + 2 * r * r + i - 1 + r * (k - 1) + (j ? r * r : 0);
     if (at_k) return faces + 4 * r * r + i - 1 + r * (j - 1) + (k ? r * r : 0);
@@ -149,7 +149,7 @@ static int find_smallest_number(const int *b, int count)
 
 /* Returns the index of a triangle's node in VTK's order. b: the node's barycentric coordinates times the order; b[2]
  * belongs to the first corner. */
-static int number_triangle_node(int order, const int b[3])
+static int find_vtk_index_of_triangle_node(int order, const int b[3])
 {
     int at = 0, max = order, min = 0;
     for (const int inner = find_smallest_number(b, 3); min < inner; min++, max -= 2, order -= 3) at += 3 * order;
@@ -160,7 +160,7 @@ static int number_triangle_node(int order, const int b[3])
     return at;
 }
 
-static int number_tet_node(int order, const int b[4])
+static int find_vtk_index_of_tet_node(int order, const int b[4])
 {
     static const signed char corner[4] = {3, 0, 1, 2}, edge_side[6] = {0, 1, 3, 2, 2, 2};
     static const signed char edge[6][2] = {{1, 2}, {2, 3}, {0, 2}, {0, 1}, {1, 3}, {0, 3}};
@@ -176,19 +176,19 @@ static int number_tet_node(int order, const int b[4])
         if (b[(int)face[n]] != min) continue;
         int on[3];
         for (int a = 0; a < 3; a++) on[a] = b[(int)face_sides[n][a]] - min;
-        return at + number_triangle_node(order, on) - 3 * order;
+        return at + find_vtk_index_of_triangle_node(order, on) - 3 * order;
     }
     return at;
 }
 
 /* Returns the index of a node inside a triangle of order p, among the nodes inside it. These are numbered row by
  * row. */
-static int number_inner_triangle_node(int p, int i, int j)
+static int find_index_among_inner_triangle_nodes(int p, int i, int j)
 {
     return i + p * (j - 1) - j * (j + 1) / 2;
 }
 
-static int number_wedge_node(int p, int i, int j, int k)
+static int find_vtk_index_of_wedge_node(int p, int i, int j, int k)
 {
     const int r = p - 1, triangle = r * (r - 1) / 2, edges = 6, faces = edges + 9 * r;
     const int quads = faces + 2 * triangle, inside = quads + 3 * r * r;
@@ -198,39 +198,39 @@ static int number_wedge_node(int p, int i, int j, int k)
     if (at_k && at_j) return edges + (k ? 3 * r : 0) + i - 1;
     if (at_k && at_far) return edges + (k ? 3 * r : 0) + r + j - 1;
     if (at_k && at_i) return edges + (k ? 3 * r : 0) + 2 * r + p - j - 1;
-    if (at_k) return faces + (k ? triangle : 0) + number_inner_triangle_node(p, i, j);
+    if (at_k) return faces + (k ? triangle : 0) + find_index_among_inner_triangle_nodes(p, i, j);
     if (at_j) return quads + i - 1 + r * (k - 1);
     if (at_far) return quads + r * r + p - i - 1 + r * (k - 1);
     if (at_i) return quads + 2 * r * r + p - j - 1 + r * (k - 1);
-    return inside + number_inner_triangle_node(p, i, j) + triangle * (k - 1);
+    return inside + find_index_among_inner_triangle_nodes(p, i, j) + triangle * (k - 1);
 }
 
 /* Returns the index of a pyramid's node in VTK's order, for pyramids of order 1 and 2. */
-static int number_pyramid_node(int p, int i, int j, int k)
+static int find_vtk_index_of_pyramid_node(int p, int i, int j, int k)
 {
-    if (p == 1) return k ? 4 : number_quad_corner(i, j);
+    if (p == 1) return k ? 4 : find_vtk_index_of_quad_corner(i, j);
     if (k == 2) return 4;
-    if (k == 1) return 9 + number_quad_corner(i, j);
-    const int on_base = number_quad_node(p, i, j);
+    if (k == 1) return 9 + find_vtk_index_of_quad_corner(i, j);
+    const int on_base = find_vtk_index_of_quad_node(p, i, j);
     return on_base < 4 ? on_base : on_base == 8 ? 13 : on_base + 1;
 }
 
-static int number_vtk_node(const session_nodes *of, bool is_old, int i, int j, int k)
+static int find_vtk_index_of_node(const session_nodes *of, bool is_old, int i, int j, int k)
 {
     const int p = of->order;
     switch (of->type) {
-    case GRID_TRIANGLE: return number_triangle_node(p, (const int[]){i, j, p - i - j});
-    case GRID_QUAD: return number_quad_node(p, i, j);
-    case GRID_TET: return number_tet_node(p, (const int[]){i, j, k, p - i - j - k});
-    case GRID_HEX: return number_hex_node(p, is_old, i, j, k);
-    case GRID_WEDGE: return number_wedge_node(p, i, j, k);
-    default: return number_pyramid_node(p, i, j, k);
+    case GRID_TRIANGLE: return find_vtk_index_of_triangle_node(p, (const int[]){i, j, p - i - j});
+    case GRID_QUAD: return find_vtk_index_of_quad_node(p, i, j);
+    case GRID_TET: return find_vtk_index_of_tet_node(p, (const int[]){i, j, k, p - i - j - k});
+    case GRID_HEX: return find_vtk_index_of_hex_node(p, is_old, i, j, k);
+    case GRID_WEDGE: return find_vtk_index_of_wedge_node(p, i, j, k);
+    default: return find_vtk_index_of_pyramid_node(p, i, j, k);
     }
 }
 
 /* ---- lexicographic order, and orders of Gmsh and Exodus ---------------------------------------------------------- */
 
-static int number_triangle_row_node(int p, int i, int j)
+static int find_row_by_row_triangle_index(int p, int i, int j)
 {
     return i + j * (p + 1) - j * (j - 1) / 2;
 }
@@ -246,13 +246,13 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     const int n = p + 1;
     int below = 0;
     switch (type) {
-    case GRID_TRIANGLE: return number_triangle_row_node(p, i, j);
+    case GRID_TRIANGLE: return find_row_by_row_triangle_index(p, i, j);
     case GRID_QUAD:
     case GRID_HEX: return i + n * (j + n * k);
-    case GRID_WEDGE: return number_triangle_row_node(p, i, j) + k * (n * (n + 1) / 2);
+    case GRID_WEDGE: return find_row_by_row_triangle_index(p, i, j) + k * (n * (n + 1) / 2);
     case GRID_TET:
         below = count_tet_nodes(n) - count_tet_nodes(n - k);
-        return below + number_triangle_row_node(p - k, i, j);
+        return below + find_row_by_row_triangle_index(p - k, i, j);
     default:
         for (int layer = 0; layer < k; layer++) below += (n - layer) * (n - layer);
         return below + i + (n - k) * j;
@@ -280,16 +280,16 @@ static const signed char *quadratic_permutation(int type, insitu_vertex_order or
 
 int session_convert_quadratic_node_index(const session_nodes *of, insitu_vertex_order order, int n)
 {
-    const int corners = grid_type_vertices(of->type);
+    const int corners = grid_type_vertex_count(of->type);
     const signed char *turn = n < corners || of->order != 2 ? NULL : quadratic_permutation(of->type, order);
     return turn ? turn[n - corners] : n;
 }
 
-int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k)
+int session_find_node_in_connectivity(const session_nodes *of, insitu_vertex_order order, int i, int j, int k)
 {
     if (order == INSITU_ORDER_LEXICOGRAPHIC) return number_lexicographic_node(of->type, of->order, i, j, k);
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
-    return session_convert_quadratic_node_index(of, order, number_vtk_node(of, is_old, i, j, k));
+    return session_convert_quadratic_node_index(of, order, find_vtk_index_of_node(of, is_old, i, j, k));
 }
 
 void session_find_corners(const session_nodes *of, insitu_vertex_order order, int out[8])
@@ -298,7 +298,7 @@ void session_find_corners(const session_nodes *of, insitu_vertex_order order, in
     const int p = of->order;
     for (int c = 0; c < shape->corner_count; c++) {
         const signed char *at = shape->corners[c];
-        out[c] = session_node_index(of, order, p * at[0], p * at[1], p * at[2]);
+        out[c] = session_find_node_in_connectivity(of, order, p * at[0], p * at[1], p * at[2]);
     }
 }
 

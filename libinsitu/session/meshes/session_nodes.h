@@ -21,7 +21,7 @@ typedef struct session_nodes {
 } session_nodes;
 
 /* Returns the linear type with the same corners, or GRID_NO_TYPE if the caller's type is not of higher order. */
-int session_corner_type(int type);
+int session_get_linear_type(int type);
 
 /* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
 bool session_is_lagrange(int type);
@@ -35,7 +35,7 @@ int session_lagrange_type(int corner_type);
 
 /* Describes a complete cell of this order: a cell with all nodes of its lattice. corner_type: the linear type with the
  * same corners. */
-session_nodes session_complete_nodes(int corner_type, int order);
+session_nodes session_describe_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of this type and order, or 0 if there is no such cell. order: may be 0 for
  * types that have only one order. */
@@ -47,7 +47,7 @@ const char *session_describe_unsupported_node_order(const session_nodes *of, ins
 /* Returns the position, in the cell's list of nodes in the connectivity, of the node with the lattice indices i, j, k.
  * The axes of the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i
  * and j than the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
-int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
+int session_find_node_in_connectivity(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
 /* Finds the position of each corner in the cell's list of nodes in the connectivity. out: one position per corner, with
  * corners in VTK's order. */

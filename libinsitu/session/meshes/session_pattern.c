@@ -36,10 +36,10 @@ typedef struct pattern_list {
 static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 {
     session_pattern *out = list->out;
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     for (int n = 0; n < count && out->piece_positions; n++)
         out->piece_positions[out->piece_size + n] =
-            session_node_index(&out->nodes, list->order, nodes[n][0], nodes[n][1], nodes[n][2]);
+            session_find_node_in_connectivity(&out->nodes, list->order, nodes[n][0], nodes[n][1], nodes[n][2]);
     if (out->types) out->types[out->piece_count] = (unsigned char)type;
     out->piece_count++;
     out->piece_size += count;
@@ -50,7 +50,7 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 static void add_piece_by_corner_offsets(const pattern_list *list, int type, const int at[3], const signed char *steps)
 {
     int nodes[GRID_MAX_CELL_VERTICES][3];
-    for (int n = 0; n < grid_type_vertices(type); n++)
+    for (int n = 0; n < grid_type_vertex_count(type); n++)
         for (int axis = 0; axis < 3; axis++) nodes[n][axis] = at[axis] + (steps[n] >> axis & 1);
     add_piece(list, type, (const int(*)[3])nodes);
 }
@@ -77,7 +77,7 @@ static void list_pieces_of_wedge_or_triangle(const pattern_list *list, int p)
             }
 }
 
-static void list_tets(const pattern_list *list, int p)
+static void list_pieces_of_tet(const pattern_list *list, int p)
 {
     static const signed char up[] = {0, 1, 2, 4}, down[] = {3, 6, 5, 7};
     static const signed char octahedron[4][4] = {{1, 3, 2, 6}, {1, 5, 3, 6}, {1, 4, 5, 6}, {1, 2, 4, 6}};
@@ -93,7 +93,7 @@ static void list_tets(const pattern_list *list, int p)
 
 /* Lists the pieces of a pyramid of order p. Node i, j of layer k + 1 is above the centre of the quad in layer k whose
  * first node is i, j. */
-static void list_pyramids(const pattern_list *list, int p)
+static void list_pieces_of_pyramid(const pattern_list *list, int p)
 {
     for (int k = 0; k < p; k++)
         for (int j = 0; j < p - k; j++)
@@ -120,8 +120,8 @@ static void list_pieces(const pattern_list *list)
     case GRID_QUAD: list_pieces_of_hex_or_quad(list, p); break;
     case GRID_WEDGE:
     case GRID_TRIANGLE: list_pieces_of_wedge_or_triangle(list, p); break;
-    case GRID_TET: list_tets(list, p); break;
-    default: list_pyramids(list, p); break;
+    case GRID_TET: list_pieces_of_tet(list, p); break;
+    default: list_pieces_of_pyramid(list, p); break;
     }
 }
 
@@ -139,7 +139,7 @@ static int find_midpoint(const session_shape *shape, int a, int b)
 }
 
 /* Adds the polygon that cuts off a corner: the midpoints of the edges at the corner. */
-static void add_cut(session_pattern *out, const session_shape *shape, int corner)
+static void add_polygon_at_corner(session_pattern *out, const session_shape *shape, int corner)
 {
     pattern_polygon *cut = &out->polygons[out->polygon_count++];
     *cut = (pattern_polygon){.corner = corner};
@@ -185,11 +185,11 @@ static void orient_outwards(const session_shape *shape, pattern_polygon *p)
 
 /* Finds the midpoints of a serendipity cell's edges, and the polygons by which the cell is split
  * (session_pattern.h). */
-static void find_polygons(session_pattern *out, insitu_vertex_order order)
+static void find_splitting_polygons(session_pattern *out, insitu_vertex_order order)
 {
     const session_shape *shape = session_get_cell_shape(out->nodes.type);
     const int corners = shape->corner_count;
-    for (int c = 0; c < corners; c++) add_cut(out, shape, c);
+    for (int c = 0; c < corners; c++) add_polygon_at_corner(out, shape, c);
     for (int f = 0; f < shape->face_count; f++) {
         pattern_polygon *face = &out->polygons[out->polygon_count++];
         *face = (pattern_polygon){.corner = -1, .count = shape->faces[f][3] < 0 ? 3 : 4};
@@ -229,7 +229,7 @@ static bool has_node(const pattern_polygon *p, int node)
     return has;
 }
 
-/* Splits a serendipity quad into triangles. Parameters and result are those of session_cut_serendipity(). */
+/* Splits a serendipity quad into triangles. Parameters and result are those of session_split_serendipity_cell(). */
 static int split_quad(const session_pattern *of, const int *ranks, int pieces[][4])
 {
     int count = 0, triangles[2][3];
@@ -243,7 +243,7 @@ static int split_quad(const session_pattern *of, const int *ranks, int pieces[][
     return count;
 }
 
-int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4])
+int session_split_serendipity_cell(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4])
 {
     int count = 0, apex = pattern->midpoints[0], triangles[2][3];
     if (pattern->nodes.type == GRID_QUAD) return split_quad(pattern, ranks, pieces);
@@ -263,11 +263,11 @@ int session_cut_serendipity(const session_pattern *pattern, const int *ranks, in
 
 /* ---- patterns of all types of cells ------------------------------------------------------------------------------ */
 
-static bool make_linear(int type, insitu_vertex_order order, session_pattern *out)
+static bool make_pattern_of_linear_cell(int type, insitu_vertex_order order, session_pattern *out)
 {
     const signed char *turn = session_vertex_permutation(order, type);
     out->piece_count = 1;
-    out->piece_size = grid_type_vertices(type);
+    out->piece_size = grid_type_vertex_count(type);
     out->types = base_alloc(1);
     out->piece_positions = base_alloc((size_t)out->piece_size * sizeof *out->piece_positions);
     if (!out->types || !out->piece_positions) return false;
@@ -279,9 +279,9 @@ static bool make_linear(int type, insitu_vertex_order order, session_pattern *ou
 bool session_make_split_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out)
 {
     *out = (session_pattern){.type = type, .nodes = *nodes};
-    if (type == nodes->type) return make_linear(type, order, out);
+    if (type == nodes->type) return make_pattern_of_linear_cell(type, order, out);
     if (!nodes->is_complete) {
-        find_polygons(out, order);
+        find_splitting_polygons(out, order);
         return true;
     }
     const pattern_list list = {out, order};

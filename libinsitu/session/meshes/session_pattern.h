@@ -20,7 +20,7 @@ typedef struct pattern_polygon {
 
 /* Describes how cells of one type and order are split into pieces. For complete cells it lists the pieces. For
  * serendipity cells it lists only polygons, because their pieces also depend on the coordinates of the nodes
- * (session_cut_serendipity()). */
+ * (session_split_serendipity_cell()). */
 typedef struct session_pattern {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
@@ -44,6 +44,6 @@ void session_drop_split_pattern(session_pattern *pattern);
 /* Stores the vertices of a serendipity cell's pieces, as positions in the cell's list of nodes: 4 for each tet, or 3
  * for each triangle of a quad. ranks: for each midpoint, at the index of its position in that list, the number of
  * midpoints before it in the lexicographic order of coordinates. Returns the number of pieces. */
-int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
+int session_split_serendipity_cell(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
 
 #endif

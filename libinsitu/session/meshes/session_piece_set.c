@@ -38,12 +38,12 @@ static bool make_piece_kind(const session_nodes *of, insitu_vertex_order order, 
     const int type = session_lagrange_type(of->type);
     if (!session_make_interpolation(of, order, parts, is_lobatto, &out->nodes)) return false;
     if (!session_make_split_pattern(type, &out->nodes.fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces)) return false;
-    out->corner_count = of->type == GRID_PYRAMID ? 0 : grid_type_vertices(out->pieces.types[0]);
+    out->corner_count = of->type == GRID_PYRAMID ? 0 : grid_type_vertex_count(out->pieces.types[0]);
     out->word_count = (out->pieces.piece_count + 63) / 64;
     return true;
 }
 
-static void end_work(piece_work *w)
+static void free_piece_work(piece_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++) {
         session_drop_interpolation(&w->kinds[i].nodes);
@@ -51,18 +51,19 @@ static void end_work(piece_work *w)
     }
 }
 
-static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, session_piece_set *set, piece_work *w)
+static bool create_piece_work(const session_mesh *mesh, int parts, bool is_lobatto, session_piece_set *set,
+                              piece_work *w)
 {
-    const insitu_mesh *nodal = session_nodal_mesh(mesh);
+    const insitu_mesh *nodal = session_get_mesh_of_caller_nodes(mesh);
     bool is_made = true;
     *w = (piece_work){.rows = session_describe_caller_rows(nodal), .set = set};
-    session_list_kinds(&w->rows);
+    session_list_cell_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         is_made = make_piece_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);
     return is_made;
 }
 
-static const piece_kind *kind_of(const piece_work *w, int64_t cell)
+static const piece_kind *find_piece_kind_of_cell(const piece_work *w, int64_t cell)
 {
     return &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
 }
@@ -93,9 +94,10 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
                 if (session_has_node(&kind->nodes.of, i, j, k) &&
-                    session_node_index(&kind->nodes.of, INSITU_ORDER_VTK, i, j, k) < kind->nodes.of.count)
-                    is_own[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, parts * i, parts * j, parts * k)] =
-                        true;
+                    session_find_node_in_connectivity(&kind->nodes.of, INSITU_ORDER_VTK, i, j, k) <
+                        kind->nodes.of.count)
+                    is_own[session_find_node_in_connectivity(fine, INSITU_ORDER_LEXICOGRAPHIC, parts * i, parts * j,
+                                                             parts * k)] = true;
     for (int i = 0; i < kind->pieces.piece_size; i++) {
         const int node = kind->pieces.piece_positions[i];
         if (is_own[node]) set_bit(out, i / kind->corner_count);
@@ -104,7 +106,7 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
 }
 
 /* Selects, in each marked cell, one piece at each of the cell's own nodes. */
-static bool fill_sets(const piece_work *w, const unsigned char *marks, int parts)
+static bool select_pieces_at_nodes_of_cells(const piece_work *w, const unsigned char *marks, int parts)
 {
     const int64_t cells = w->rows.cells.cell_count;
     uint64_t *at_nodes[ROWS_MOST_KINDS] = {NULL};
@@ -131,16 +133,17 @@ insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned c
 {
     piece_work *w = base_alloc(sizeof *w);
     *out = (session_piece_set){0};
-    bool is_made = w && begin_work(mesh, parts, false, out, w);
+    bool is_made = w && create_piece_work(mesh, parts, false, out, w);
     const int64_t cells = is_made ? w->rows.cells.cell_count : 0;
     if (is_made) out->first_words = base_alloc((size_t)(cells + 1) * sizeof *out->first_words);
     is_made = is_made && out->first_words;
     if (is_made) out->first_words[0] = 0;
     for (int64_t cell = 0; cell < cells && is_made; cell++)
-        out->first_words[cell + 1] = out->first_words[cell] + (marks[cell] ? kind_of(w, cell)->word_count : 0);
+        out->first_words[cell + 1] =
+            out->first_words[cell] + (marks[cell] ? find_piece_kind_of_cell(w, cell)->word_count : 0);
     if (is_made) out->bits = base_alloc((size_t)(out->first_words[cells] + 1) * sizeof *out->bits);
-    is_made = is_made && out->bits && fill_sets(w, marks, parts);
-    if (w) end_work(w);
+    is_made = is_made && out->bits && select_pieces_at_nodes_of_cells(w, marks, parts);
+    if (w) free_piece_work(w);
     base_free(w);
     return is_made ? INSITU_OK : fail_for_memory(mesh, error);
 }
@@ -160,7 +163,8 @@ static size_t find_buffer_size(const piece_work *w, int field_size)
 
 /* Selects the pieces of a cell that an isosurface may cross. values: the values at the nodes of the finer lattice.
  * bits: bit i is set if piece i is selected. */
-static void add_pieces(const piece_kind *kind, const session_isovalues *isovalues, const double *values, uint64_t *bits)
+static void select_crossed_pieces(const piece_kind *kind, const session_isovalues *isovalues, const double *values,
+                                  uint64_t *bits)
 {
     double most = 0;
     for (int n = 0; n < kind->nodes.fine.count; n++) most = fmax(most, fabs(values[n]));
@@ -173,26 +177,26 @@ static void add_pieces(const piece_kind *kind, const session_isovalues *isovalue
             low = value < low ? value : low;
             high = value > high ? value : high;
         }
-        if (session_is_any_between(isovalues, low - tolerance, high + tolerance)) set_bit(bits, piece);
+        if (session_is_any_isovalue_between(isovalues, low - tolerance, high + tolerance)) set_bit(bits, piece);
     }
 }
 
 /* Selects the pieces of a refined cell that an isosurface or the plane of the request may cross. buffer: working memory
  * of find_buffer_size() doubles. */
-static void add_cell(const piece_work *w, int64_t cell, int field_size, double *buffer)
+static void select_crossed_pieces_of_cell(const piece_work *w, int64_t cell, int field_size, double *buffer)
 {
-    const piece_kind *kind = kind_of(w, cell);
+    const piece_kind *kind = find_piece_kind_of_cell(w, cell);
     const session_interpolation *of = &kind->nodes;
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     double corners[8][3], *own = buffer + field_size, *fine = own + of->of.count;
-    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
+    for (int c = 0; c < grid_type_vertex_count(of->of.type); c++)
+        grid_read_vertex_position(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
     session_read_request_values(&w->rows, w->request, cell, of->of.count, buffer, own);
     session_interpolate(of, (const double(*)[3])corners, 1, own, fine + of->fine.count, fine);
-    add_pieces(kind, &w->request->isovalues, fine, w->set->bits + w->set->first_words[cell]);
+    select_crossed_pieces(kind, &w->request->isovalues, fine, w->set->bits + w->set->first_words[cell]);
 }
 
-static bool add_cells(const piece_work *w, int threads)
+static bool select_crossed_pieces_of_all_cells(const piece_work *w, int threads)
 {
     const int64_t cells = w->rows.cells.cell_count, *first_words = w->set->first_words;
     const int field_size = w->request->values ? w->request->values->component_count : 1;
@@ -205,8 +209,8 @@ static bool add_cells(const piece_work *w, int threads)
         is_lacking = !buffer;
 #pragma omp for schedule(dynamic, 16)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (buffer && first_words[cell] < first_words[cell + 1] && kind_of(w, cell)->corner_count)
-                add_cell(w, cell, field_size, buffer);
+            if (buffer && first_words[cell] < first_words[cell + 1] && find_piece_kind_of_cell(w, cell)->corner_count)
+                select_crossed_pieces_of_cell(w, cell, field_size, buffer);
         base_free(buffer);
         region_leave();
     }
@@ -217,10 +221,10 @@ insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session
                                          int threads, session_piece_set *set, base_error *error)
 {
     piece_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(mesh, parts, request->is_lobatto, set, w);
+    bool is_made = w && create_piece_work(mesh, parts, request->is_lobatto, set, w);
     if (is_made) w->request = request;
-    is_made = is_made && add_cells(w, threads);
-    if (w) end_work(w);
+    is_made = is_made && select_crossed_pieces_of_all_cells(w, threads);
+    if (w) free_piece_work(w);
     base_free(w);
     return is_made ? INSITU_OK : fail_for_memory(mesh, error);
 }
@@ -236,7 +240,7 @@ static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
         for (int j = 0; j <= fine->order; j++)
             for (int i = 0; i <= fine->order; i++)
                 if (session_has_node(fine, i, j, k))
-                    out[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)] =
+                    out[session_find_node_in_connectivity(fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)] =
                         (unsigned char)session_faces_of_node(shape, fine->order, (const int[]){i, j, k});
 }
 
@@ -292,8 +296,9 @@ static bool add_outer_pieces(const piece_work *w, const unsigned char *outer_fac
 insitu_status session_add_outer_pieces(const session_mesh *mesh, int parts, session_piece_set *set, base_error *error)
 {
     piece_work *w = base_alloc(sizeof *w);
-    const bool is_made = w && begin_work(mesh, parts, false, set, w) && add_outer_pieces(w, mesh->finer.outer_faces);
-    if (w) end_work(w);
+    const bool is_made =
+        w && create_piece_work(mesh, parts, false, set, w) && add_outer_pieces(w, mesh->finer.outer_faces);
+    if (w) free_piece_work(w);
     base_free(w);
     return is_made ? INSITU_OK : fail_for_memory(mesh, error);
 }

@@ -22,17 +22,17 @@ typedef struct frame_sums {
 
 /* Adds a face's vertices to the sums and the bounds, and updates `least`, the cell's lexicographically first vertex.
  * Consecutive repetitions of a vertex are added once. */
-static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
+static void add_face_vertices_to_sums(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;
     grid_face_vertices(g, face, &from, &to);
-    int64_t before = grid_array_index(&g->face_connectivity, to - 1);
+    int64_t before = grid_read_index(&g->face_connectivity, to - 1);
     for (int64_t i = from; i < to; i++) {
         double p[3];
-        const int64_t vertex = grid_array_index(&g->face_connectivity, i);
+        const int64_t vertex = grid_read_index(&g->face_connectivity, i);
         if (vertex == before) continue;
         before = vertex;
-        grid_vertex(g, vertex, p);
+        grid_read_vertex_position(g, vertex, p);
         if (vector3_compare(p, least) < 0) memcpy(least, p, sizeof p);
         for (int axis = 0; axis < 3; axis++) {
             sums->sum[axis] += p[axis];
@@ -43,13 +43,14 @@ static void add_face(const grid *g, int64_t face, frame_sums *sums, double least
     }
 }
 
-static cell_frame find_cell_frame(const grid *g, int64_t cell)
+static cell_frame find_mean_and_least_vertex(const grid *g, int64_t cell)
 {
     cell_frame frame = {.least_vertex = {INFINITY, INFINITY, INFINITY}, .box_volume = 1};
     frame_sums sums = {.lower = {INFINITY, INFINITY, INFINITY}, .upper = {-INFINITY, -INFINITY, -INFINITY}};
     int64_t first, end;
     grid_cell_faces(g, cell, &first, &end);
-    for (int64_t i = first; i < end; i++) add_face(g, grid_array_index(&g->connectivity, i), &sums, frame.least_vertex);
+    for (int64_t i = first; i < end; i++)
+        add_face_vertices_to_sums(g, grid_read_index(&g->connectivity, i), &sums, frame.least_vertex);
     if (sums.count == 0) return (cell_frame){0};
     for (int axis = 0; axis < 3; axis++) {
         frame.mean[axis] = sums.sum[axis] / sums.count;
@@ -67,7 +68,7 @@ static double tet_volume(const double *a, const double *b, const double *c)
 
 static void read_relative_corner(const grid *g, int64_t entry, const double mean[3], double out[3])
 {
-    grid_vertex(g, grid_array_index(&g->face_connectivity, entry), out);
+    grid_read_vertex_position(g, grid_read_index(&g->face_connectivity, entry), out);
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
@@ -88,9 +89,9 @@ static int64_t find_first_vertex_entry(const grid *g, int64_t from, int64_t to)
 {
     int64_t least = from;
     double position[3], p[3];
-    grid_vertex(g, grid_array_index(&g->face_connectivity, from), position);
+    grid_read_vertex_position(g, grid_read_index(&g->face_connectivity, from), position);
     for (int64_t i = from + 1; i < to; i++) {
-        grid_vertex(g, grid_array_index(&g->face_connectivity, i), p);
+        grid_read_vertex_position(g, grid_read_index(&g->face_connectivity, i), p);
         if (vector3_compare(p, position) >= 0) continue;
         memcpy(position, p, sizeof p);
         least = i;
@@ -108,7 +109,8 @@ typedef struct volume_sums {
 
 /* Adds the tets on the fan of triangles of a face to the sums. mean: mean of the cell's vertices. origin: position of
  * the cell's lexicographically first vertex, relative to the mean. */
-static void add_fan(const grid *g, int64_t face, const double mean[3], const double origin[3], volume_sums *sums)
+static void add_tets_of_face(const grid *g, int64_t face, const double mean[3], const double origin[3],
+                             volume_sums *sums)
 {
     int64_t from, to;
     double corners[3][3];
@@ -138,10 +140,11 @@ double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
     int64_t first, end;
     double origin[3];
     volume_sums sums = {0};
-    const cell_frame frame = find_cell_frame(g, cell);
+    const cell_frame frame = find_mean_and_least_vertex(g, cell);
     for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least_vertex[axis] - frame.mean[axis];
     grid_cell_faces(g, cell, &first, &end);
-    for (int64_t i = first; i < end; i++) add_fan(g, grid_array_index(&g->connectivity, i), frame.mean, origin, &sums);
+    for (int64_t i = first; i < end; i++)
+        add_tets_of_face(g, grid_read_index(&g->connectivity, i), frame.mean, origin, &sums);
     *is_flat = sums.volume_from_corner <= flat_share * (double)sums.triangle_count * frame.box_volume;
     return *is_flat ? 0 : sums.volume_from_mean;
 }

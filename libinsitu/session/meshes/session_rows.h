@@ -29,55 +29,56 @@ typedef struct session_rows {
 } session_rows;
 
 /* Describes where the nodes of each cell of a mesh are in the connectivity. The mesh's description must be valid. The
- * list of kinds is left empty (session_list_kinds()). */
+ * list of kinds is left empty (session_list_cell_kinds()). */
 session_rows session_describe_rows(const session_mesh *mesh);
 /* Does the same for a valid description of a mesh, whose cells share vertices as the caller has described them. The
  * list of kinds is left empty. */
 session_rows session_describe_caller_rows(const insitu_mesh *given);
 
 /* Returns the index, in the caller's connectivity, of the entry with a cell's first node. */
-static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
+static inline int64_t session_find_first_entry_of_cell(const session_rows *rows, int64_t cell)
 {
-    return rows->cells.offsets.data ? grid_array_index(&rows->cells.offsets, cell) : cell * rows->row_stride;
+    return rows->cells.offsets.data ? grid_read_index(&rows->cells.offsets, cell) : cell * rows->row_stride;
 }
 
 /* Returns the number of nodes of a cell. */
-static inline int64_t session_row_size(const session_rows *rows, int64_t cell)
+static inline int64_t session_count_nodes_of_cell(const session_rows *rows, int64_t cell)
 {
     if (!rows->cells.offsets.data) return rows->nodes_per_cell;
     return (int64_t)((uint64_t)grid_offset_end(&rows->cells.offsets, cell) -
-                     (uint64_t)grid_array_index(&rows->cells.offsets, cell));
+                     (uint64_t)grid_read_index(&rows->cells.offsets, cell));
 }
 
 /* Returns the caller's vertex to which an entry of the connectivity refers. */
 static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry)
 {
-    return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;
+    return rows->cells.connectivity.data ? grid_read_index(&rows->cells.connectivity, entry) : entry;
 }
 
 /* Returns the index of a cell's node in a sequence of all nodes of all cells. It is the index of an entry of the
  * connectivity if unused entries are not counted. node: position of the node in the cell's list of nodes. */
 static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, int node)
 {
-    return rows->cells.offsets.data ? session_row_first(rows, cell) + node : cell * rows->nodes_per_cell + node;
+    return rows->cells.offsets.data ? session_find_first_entry_of_cell(rows, cell) + node
+                                    : cell * rows->nodes_per_cell + node;
 }
 
 /* Returns the index, in session_mesh.cells, of the vertex that is the node at position `node` in the cell's list of
  * nodes. */
-static inline int64_t session_find_row_vertex(const session_rows *rows, int64_t cell, int node)
+static inline int64_t session_find_vertex_of_node(const session_rows *rows, int64_t cell, int node)
 {
     return rows->is_discontinuous ? session_row_entry(rows, cell, node)
-                                  : session_row_vertex(rows, session_row_first(rows, cell) + node);
+                                  : session_row_vertex(rows, session_find_first_entry_of_cell(rows, cell) + node);
 }
 
 /* Returns the index, in rows->kinds, of the cells of this type with `count` nodes, or -1 if they are not listed. */
-int session_find_kind(const session_rows *rows, int type, int64_t count);
+int session_find_cell_kind(const session_rows *rows, int type, int64_t count);
 static inline int session_find_kind_of_cell(const session_rows *rows, int64_t cell)
 {
-    return session_find_kind(rows, grid_cell_type(&rows->cells, cell), session_row_size(rows, cell));
+    return session_find_cell_kind(rows, grid_cell_type(&rows->cells, cell), session_count_nodes_of_cell(rows, cell));
 }
 
 /* Lists the kinds of all cells. The cells must have been split before, so that their types are known to be valid. */
-void session_list_kinds(session_rows *rows);
+void session_list_cell_kinds(session_rows *rows);
 
 #endif

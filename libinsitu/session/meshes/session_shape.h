@@ -9,7 +9,7 @@ typedef struct session_shape {
     int type;
     int corner_count, edge_count, face_count;
     /* Indices i, j, k of each corner in a lattice of order 1. The axes of the lattice are the edges at the first corner
-     * (session_node_index()). */
+     * (session_find_node_in_connectivity()). */
     signed char corners[8][3];
     signed char edges[12][2]; /* two corners of each edge; edges are in VTK's order of their midpoints */
     /* corners of each face, in the order of session_face_table (session_cell_faces.h); the fourth corner of a triangle

@@ -38,7 +38,8 @@ static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, 
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
-        const session_sizes own = session_get_sizes(mesh), *nodal = mesh->finer.parts ? &mesh->finer.sizes : &own;
+        const session_sizes own = session_get_bounds_and_counts(mesh),
+                            *nodal = mesh->finer.parts ? &mesh->finer.sizes : &own;
         const session_sizes of = by_nodes ? *nodal : own;
         if (of.drawn_count == 0) continue;
         for (int axis = 0; axis < 3; axis++) {

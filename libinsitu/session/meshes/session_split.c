@@ -40,11 +40,11 @@ typedef struct split_work {
 
 bool session_has_higher_order(const insitu_mesh *given)
 {
-    if (given->cell_count == 0 || given->lattice || session_has_owners(given)) return false;
-    if (!given->cell_types.data) return session_corner_type((int)given->cell_type) != GRID_NO_TYPE;
+    if (given->cell_count == 0 || given->lattice || session_has_face_owners(given)) return false;
+    if (!given->cell_types.data) return session_get_linear_type((int)given->cell_type) != GRID_NO_TYPE;
     const grid g = session_caller_grid(given);
     int64_t cell = 0;
-    while (cell < given->cell_count && session_corner_type(grid_cell_type(&g, cell)) == GRID_NO_TYPE) cell++;
+    while (cell < given->cell_count && session_get_linear_type(grid_cell_type(&g, cell)) == GRID_NO_TYPE) cell++;
     return cell < given->cell_count;
 }
 
@@ -61,14 +61,15 @@ static const session_pattern *find_cell_pattern(const split_work *w, int64_t cel
 
 /* ---- lists of pieces by type of cell, and checks of the caller's cells ------------------------------------------- */
 
-static insitu_status describe_type(const session_mesh *mesh, int64_t cell, int type, int64_t count, base_error *error)
+static insitu_status report_unsupported_cell_type(const session_mesh *mesh, int64_t cell, int type, int64_t count,
+                                                  base_error *error)
 {
     const long long at = cell, nodes = count;
     if (type == GRID_POLYHEDRON || type == GRID_POLYGON)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld is a %s, and others are of higher order: give them in another mesh",
                          mesh->label, at, type == GRID_POLYGON ? "polygon" : "polyhedron");
-    if (session_corner_type(type) == GRID_NO_TYPE && !grid_type_vertices(type))
+    if (session_get_linear_type(type) == GRID_NO_TYPE && !grid_type_vertex_count(type))
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld: unknown cell type %d", mesh->label, at,
                          type);
     return base_fail(error, INSITU_ERROR_MESH,
@@ -78,11 +79,11 @@ static insitu_status describe_type(const session_mesh *mesh, int64_t cell, int t
 
 static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t count, base_error *error)
 {
-    session_nodes nodes = {type, 1, grid_type_vertices(type), true, false};
+    session_nodes nodes = {type, 1, grid_type_vertex_count(type), true, false};
     const insitu_vertex_order order = w->mesh->given.vertex_order;
     const bool is_linear = nodes.count && nodes.count == count;
     if (!is_linear && !session_describe_nodes(type, count, &nodes))
-        return describe_type(w->mesh, cell, type, count, error);
+        return report_unsupported_cell_type(w->mesh, cell, type, count, error);
     const char *why = is_linear ? NULL : session_describe_unsupported_node_order(&nodes, order);
     if (why)
         return base_fail(error, INSITU_ERROR_MESH,
@@ -103,8 +104,8 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
 static insitu_status check_offsets(const split_work *w, int64_t cell, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
-    const long long base = given->index_base, first = session_row_first(&w->rows, cell) + base,
-                    next = first + session_row_size(&w->rows, cell);
+    const long long base = given->index_base, first = session_find_first_entry_of_cell(&w->rows, cell) + base,
+                    next = first + session_count_nodes_of_cell(&w->rows, cell);
     const long long last = given->connectivity_count + base;
     if (!w->rows.cells.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH,
@@ -112,7 +113,7 @@ static insitu_status check_offsets(const split_work *w, int64_t cell, base_error
                      w->mesh->label, (long long)cell, first, next, base, last);
 }
 
-static void find_only_type(split_work *w)
+static void find_common_type_of_pieces(split_work *w)
 {
     int types = 0;
     for (int type = 0; type < LINEAR_TYPES; type++) {
@@ -133,9 +134,9 @@ static insitu_status find_patterns(split_work *w, base_error *error)
     for (int64_t cell = 0; cell < cells; cell++) {
         if (check_offsets(w, cell, error)) return error->status;
         const int type = grid_cell_type(&w->rows.cells, cell);
-        const int64_t size = session_row_size(&w->rows, cell);
+        const int64_t size = session_count_nodes_of_cell(&w->rows, cell);
         if (type == last_type && size == last_size) continue;
-        if (session_find_kind(&w->rows, type, size) < 0 && add_pattern(w, cell, type, size, error))
+        if (session_find_cell_kind(&w->rows, type, size) < 0 && add_pattern(w, cell, type, size, error))
             return error->status;
         last_type = type;
         last_size = size;
@@ -147,14 +148,14 @@ static insitu_status find_patterns(split_work *w, base_error *error)
                          "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld", w->mesh->label,
                          (long long)end + given->index_base, given->index_base ? " + 1" : "",
                          (long long)given->connectivity_count + given->index_base);
-    find_only_type(w);
+    find_common_type_of_pieces(w);
     return INSITU_OK;
 }
 
-static insitu_status describe_index(const split_work *w, int64_t cell, base_error *error)
+static insitu_status report_invalid_vertex_index(const split_work *w, int64_t cell, base_error *error)
 {
     const long long base = w->mesh->given.index_base, last = w->mesh->given.vertex_count - 1 + base;
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     int64_t n = 0;
     while (session_row_vertex(&w->rows, first + n) >= 0 &&
            session_row_vertex(&w->rows, first + n) < w->mesh->given.vertex_count)
@@ -174,7 +175,8 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
         for (int64_t cell = 0; cell < cells; cell++) {
-            const int64_t first = session_row_first(&w->rows, cell), size = session_row_size(&w->rows, cell);
+            const int64_t first = session_find_first_entry_of_cell(&w->rows, cell),
+                          size = session_count_nodes_of_cell(&w->rows, cell);
             for (int64_t n = 0; n < size && cell < bad; n++) {
                 const int64_t vertex = session_row_vertex(&w->rows, first + n);
                 if (vertex < 0 || vertex >= vertices) bad = cell;
@@ -182,20 +184,20 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
         }
         region_leave();
     }
-    return bad < cells ? describe_index(w, bad, error) : INSITU_OK;
+    return bad < cells ? report_invalid_vertex_index(w, bad, error) : INSITU_OK;
 }
 
 /* ---- making the pieces of all cells ------------------------------------------------------------------------------ */
 
 /* Computes, for each midpoint of a serendipity cell, the number of midpoints before it in the lexicographic order of
  * positions; midpoints at equal positions have equal numbers. */
-static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
+static void order_midpoints_by_position(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
     double at[12][3];
     for (int n = 0; n < of->midpoint_count; n++)
         for (int axis = 0; axis < 3; axis++) {
             const int64_t vertex = session_row_vertex(&w->rows, first + of->midpoints[n]);
-            at[n][axis] = grid_array_number(&w->rows.cells.coordinates[axis], vertex);
+            at[n][axis] = grid_read_number(&w->rows.cells.coordinates[axis], vertex);
         }
     for (int n = 0; n < of->midpoint_count; n++) {
         int rank = 0;
@@ -245,8 +247,8 @@ static int count_made_pieces(const split_work *w, const session_pattern *of, int
 static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int pieces[PATTERN_MOST_LOOSE][4])
 {
     int ranks[27] = {0};
-    rank_midpoints(w, of, session_row_first(&w->rows, cell), ranks);
-    return session_cut_serendipity(of, ranks, pieces);
+    order_midpoints_by_position(w, of, session_find_first_entry_of_cell(&w->rows, cell), ranks);
+    return session_split_serendipity_cell(of, ranks, pieces);
 }
 
 static void count_pieces(const split_work *w, int64_t cell)
@@ -260,7 +262,7 @@ static void count_pieces(const split_work *w, int64_t cell)
         w->first_entries[cell + 1] = count * (of->nodes.type == GRID_QUAD ? 3 : 4);
     else /* pieces of a cell have different types only if all pieces of the cell are made */
         w->first_entries[cell + 1] =
-            count == of->piece_count ? of->piece_size : count * grid_type_vertices(of->types[0]);
+            count == of->piece_count ? of->piece_size : count * grid_type_vertex_count(of->types[0]);
 }
 
 static void accumulate_counts(int64_t *counts, int64_t cells)
@@ -294,27 +296,28 @@ static insitu_status count_all_pieces(split_work *w, int threads, base_error *er
 static int64_t entry_count(const split_work *w)
 {
     const int64_t cells = w->mesh->given.cell_count;
-    return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertices(w->only_type);
+    return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertex_count(w->only_type);
 }
 
 /* Stores a corner of a piece at index `at` of the pieces' connectivity: as a vertex or, if stores_entries is set, as an
  * entry of the caller's connectivity. node: position of the corner in the cell's list of nodes. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int node)
 {
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     session_store_index(&w->piece_entries, at,
                         w->stores_entries ? session_row_entry(&w->rows, cell, node)
                                           : session_row_vertex(&w->rows, first + node));
 }
 
-static void store_cell(const split_work *w, int64_t cell)
+static void store_pieces_of_cell(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
-    int64_t at = w->first_entries ? w->first_entries[cell] : w->first_pieces[cell] * grid_type_vertices(w->only_type);
+    int64_t at =
+        w->first_entries ? w->first_entries[cell] : w->first_pieces[cell] * grid_type_vertex_count(w->only_type);
     piece_walk walk = begin_piece_walk(w, of, cell);
     if (!walk.words)
         for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->piece_positions[n]);
-    const int corners = walk.words ? grid_type_vertices(of->types[0]) : 0;
+    const int corners = walk.words ? grid_type_vertex_count(of->types[0]) : 0;
     for (int piece; walk.words && (piece = next_piece(&walk)) >= 0;)
         for (int n = 0; n < corners; n++) store_corner(w, cell, at++, of->piece_positions[piece * corners + n]);
     if (!of->polygon_count) return;
@@ -324,14 +327,14 @@ static void store_cell(const split_work *w, int64_t cell)
         for (int n = 0; n < size; n++) store_corner(w, cell, at++, loose[i][n]);
 }
 
-static void store_cells(const split_work *w, int threads)
+static void store_pieces_of_all_cells(const split_work *w, int threads)
 {
     const int64_t cells = w->mesh->given.cell_count;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t cell = 0; cell < cells; cell++) store_cell(w, cell);
+        for (int64_t cell = 0; cell < cells; cell++) store_pieces_of_cell(w, cell);
         region_leave();
     }
 }
@@ -340,7 +343,7 @@ static void store_cells(const split_work *w, int threads)
 
 /* Stores, for each piece, the index and the ghost flag of the caller's cell that contains it, and the type and offset
  * of the piece. */
-static void store_parents(const split_work *w, session_topology *t)
+static void store_cell_of_each_piece(const split_work *w, session_topology *t)
 {
     const insitu_mesh *given = &w->mesh->given;
     for (int64_t cell = 0; cell < given->cell_count; cell++) {
@@ -354,7 +357,7 @@ static void store_parents(const split_work *w, session_topology *t)
             if (!w->first_entries) continue;
             t->cell_types[i] = (unsigned char)type;
             session_store_index(&t->offsets, i, at);
-            at += grid_type_vertices(type);
+            at += grid_type_vertex_count(type);
         }
     }
     if (w->first_entries) session_store_index(&t->offsets, w->first_pieces[given->cell_count], entry_count(w));
@@ -380,9 +383,9 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     if (!t->parents || (w->first_entries && !t->cell_types) || (mesh->given.ghosts.data && !t->ghosts))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld pieces of cells", mesh->label,
                          (long long)pieces);
-    store_parents(w, t);
+    store_cell_of_each_piece(w, t);
     w->piece_entries = t->connectivity;
-    store_cells(w, threads);
+    store_pieces_of_all_cells(w, threads);
     t->cell_bytes = (entries + 1) * t->connectivity.stride + pieces * (int64_t)sizeof *t->parents;
     if (w->first_entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
     if (t->ghosts) t->cell_bytes += pieces;
@@ -392,7 +395,7 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     return INSITU_OK;
 }
 
-static void end_split(split_work *w)
+static void free_split_work(split_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++) session_drop_split_pattern(&w->patterns[i]);
     base_free(w->first_pieces);
@@ -406,11 +409,11 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
     if (!status) status = check_indices(&w, threads, error);
     if (!status) status = count_all_pieces(&w, threads, error);
     if (!status) status = make_topology(&w, mesh, threads, error);
-    end_split(&w);
+    free_split_work(&w);
     return status;
 }
 
-insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
+insitu_status session_make_entry_connectivity(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
 {
     split_work w = {.mesh = mesh, .rows = session_describe_rows(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
@@ -421,14 +424,14 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     if (!status && !session_allocate_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
         status = error->status;
     w.piece_entries = *out;
-    if (!status) store_cells(&w, threads);
-    end_split(&w);
+    if (!status) store_pieces_of_all_cells(&w, threads);
+    free_split_work(&w);
     return status;
 }
 
 /* ---- counts of the caller's cells -------------------------------------------------------------------------------- */
 
-session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
+session_counts session_count_split_cells(const session_mesh *mesh, bool any_inverted)
 {
     const grid *g = &mesh->cells;
     session_counts out = {0};
@@ -450,7 +453,7 @@ session_counts session_count_parents(const session_mesh *mesh, bool any_inverted
     return out;
 }
 
-int64_t session_count_parents_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count)
+int64_t session_count_cells_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count)
 {
     uint64_t *bits = base_calloc((size_t)(mesh->given.cell_count + 63) / 64, sizeof *bits);
     int64_t parents = 0;

@@ -15,7 +15,8 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
 /* Creates a second connectivity of the pieces. For each corner of each piece it contains, instead of the index of a
  * vertex, the index of the entry of the caller's connectivity from which the corner was taken; unused entries at the
  * end of each cell's entries are not counted. Local. */
-insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
+insitu_status session_make_entry_connectivity(const session_mesh *mesh, int threads, grid_array *out,
+                                              base_error *error);
 
 /* Converts the index of an entry of the caller's connectivity. `entry` is the entry's index if the unused entries at
  * the end of each cell's row are not counted; the result is its index if all entries are counted. */
@@ -23,10 +24,10 @@ int64_t session_find_connectivity_index(const insitu_mesh *given, int64_t entry)
 
 /* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat. It is inverted
  * if at least one of its pieces is inverted; inverted cells are counted only if any_inverted is set. Local. */
-session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
+session_counts session_count_split_cells(const session_mesh *mesh, bool any_inverted);
 
 /* Returns the number of the caller's cells that have at least one piece in the list. If memory runs out, returns the
  * number of all drawn cells. Local. */
-int64_t session_count_parents_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
+int64_t session_count_cells_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
 
 #endif

@@ -62,7 +62,7 @@ static bool fill_weights(const session_nodes *of, insitu_vertex_order order, boo
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++) {
                 if (!session_has_node(of, i, j, k)) continue;
-                const int node = session_node_index(of, order, i, j, k);
+                const int node = session_find_node_in_connectivity(of, order, i, j, k);
                 if (node < of->count) find_corner_weights(of->type, (const double[]){x[i], x[j], x[k]}, (*out)[node]);
             }
     return *out;
@@ -78,17 +78,17 @@ static bool make_linear_positions(const session_nodes *of, insitu_vertex_order o
            (!session_may_have_lobatto_nodes(of) || fill_weights(of, order, true, &out->weights[1]));
 }
 
-static bool begin_work(const insitu_mesh *given, straight_work *w)
+static bool create_straight_work(const insitu_mesh *given, straight_work *w)
 {
     *w = (straight_work){.rows = session_describe_caller_rows(given)};
-    session_list_kinds(&w->rows);
+    session_list_cell_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         is_made = make_linear_positions(&w->rows.kinds[i].nodes, given->vertex_order, &w->kinds[i]);
     return is_made;
 }
 
-static void end_work(straight_work *w)
+static void free_straight_work(straight_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++)
         for (int n = 0; n < 2; n++) base_free(w->kinds[i].weights[n]);
@@ -102,7 +102,7 @@ static bool is_straight(const straight_work *w, const linear_positions *kind, in
 {
     for (int n = 0; n < kind->of.count; n++) {
         double at[3];
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), at);
+        grid_read_vertex_position(&w->rows.cells, session_row_vertex(&w->rows, first + n), at);
         for (int x = 0; x < 3; x++) {
             double expected = 0;
             for (int c = 0; c < kind->corner_count; c++) expected += weights[n][c] * corners[c][x];
@@ -115,11 +115,11 @@ static bool is_straight(const straight_work *w, const linear_positions *kind, in
 static bool is_bent(const straight_work *w, int64_t cell)
 {
     const linear_positions *kind = &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
-    const int64_t first = session_row_first(&w->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&w->rows, cell);
     double corners[8][3], extent = 0;
     if (!kind->weights[0] || grid_is_ghost(&w->rows.cells, cell)) return false;
     for (int c = 0; c < kind->corner_count; c++) {
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + kind->corners[c]), corners[c]);
+        grid_read_vertex_position(&w->rows.cells, session_row_vertex(&w->rows, first + kind->corners[c]), corners[c]);
         for (int x = 0; x < 3; x++) extent = fmax(extent, fabs(corners[c][x] - corners[0][x]));
     }
     const double tolerance = slack * extent / kind->of.order;
@@ -133,7 +133,7 @@ static bool is_bent(const straight_work *w, int64_t cell)
 bool session_has_bent_cells(const session_mesh *mesh, int threads)
 {
     straight_work *w = base_alloc(sizeof *w);
-    bool is_any = !w || !begin_work(mesh->finer.parts ? &mesh->finer.nodal : &mesh->given, w);
+    bool is_any = !w || !create_straight_work(mesh->finer.parts ? &mesh->finer.nodal : &mesh->given, w);
     if (w && !is_any) {
         const int64_t cells = w->rows.cells.cell_count;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, cells)) reduction(|| : is_any)
@@ -144,7 +144,7 @@ bool session_has_bent_cells(const session_mesh *mesh, int threads)
             region_leave();
         }
     }
-    if (w) end_work(w);
+    if (w) free_straight_work(w);
     base_free(w);
     return is_any;
 }

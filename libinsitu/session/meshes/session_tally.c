@@ -90,7 +90,7 @@ static bool is_flat_everywhere(int type, double points[][3])
     const cell_corners of = find_cell_corners(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += fabs(corner_volume(points, of.corners[i]));
-    return is_flat_volume(sum / of.volume_factor, box_volume(points, grid_type_vertices(type)));
+    return is_flat_volume(sum / of.volume_factor, box_volume(points, grid_type_vertex_count(type)));
 }
 
 /* Computes the cube root of the volume by the same formula as the vectorized code (session_lane_loops.c), which takes
@@ -112,7 +112,7 @@ MMBVH_INLINE double cell_size(double volume)
 
 /* Adds a drawn cell with this volume to *tally. For a flat cell, whose computed volume is only a rounding error, 0 must
  * be passed. */
-MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
+MMBVH_INLINE void tally_drawn_cell_of_volume(mesh_tally *tally, double volume)
 {
     tally->drawn_count++;
     tally->inverted_count += volume < 0;
@@ -126,7 +126,7 @@ MMBVH_INLINE void tally_shell(mesh_tally *tally)
     tally->shell_count++;
 }
 
-MMBVH_INLINE void tally_point(mesh_tally *tally, const double point[3])
+MMBVH_INLINE void tally_extend_bounds(mesh_tally *tally, const double point[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         tally->lower[axis] = point[axis] < tally->lower[axis] ? point[axis] : tally->lower[axis];
@@ -145,9 +145,9 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
     for (int i = 0; grid_walk_next(&walk, &vertex); i++) {
-        double *point = points[grid_type_vertices(type) ? i : 0];
-        grid_vertex(g, vertex, point);
-        tally_point(tally, point);
+        double *point = points[grid_type_vertex_count(type) ? i : 0];
+        grid_read_vertex_position(g, vertex, point);
+        tally_extend_bounds(tally, point);
     }
     if (grid_is_shell_type(type)) {
         tally_shell(tally);
@@ -161,7 +161,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         volume = signed_volume(type, points);
         is_flat_cell = is_flat_everywhere(type, points);
     }
-    tally_volume(tally, is_flat_cell ? 0 : volume);
+    tally_drawn_cell_of_volume(tally, is_flat_cell ? 0 : volume);
     tally->flat_count += is_flat_cell;
 }
 
@@ -191,7 +191,7 @@ static void compute_quad_corner_areas(double points[][3], double out[4])
     }
 }
 
-bool tally_has_both_signs(int type, double points[][3])
+bool tally_has_corners_of_both_signs(int type, double points[][3])
 {
     const bool is_quad = type == GRID_QUAD;
     const cell_corners of = find_cell_corners(is_quad ? GRID_TET : type);
@@ -219,7 +219,7 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
 {
     const grid_array *offsets = &mesh->cells.offsets;
     if (!offsets->data) return true;
-    const int64_t first = grid_array_index(offsets, cell), next = grid_offset_end(offsets, cell);
+    const int64_t first = grid_read_index(offsets, cell), next = grid_offset_end(offsets, cell);
     return first >= 0 && next >= first && next <= mesh->topology.connectivity_count && next - first == count;
 }
 
@@ -257,14 +257,14 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
         return false;
     t->ghost_count += is_ghost;
     if (is_ghost) return true;
-    for (int i = 0; i < count; i++) tally_point(t, points[i]);
+    for (int i = 0; i < count; i++) tally_extend_bounds(t, points[i]);
     if (shape == FETCH_BY_CELL && grid_is_shell_type(type)) {
         tally_shell(t);
         return true;
     }
     const double volume = signed_volume(type, points);
     *least = fabs(volume) < *least ? fabs(volume) : *least;
-    tally_volume(t, volume);
+    tally_drawn_cell_of_volume(t, volume);
     return true;
 }
 
@@ -274,7 +274,7 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
 {
     const grid *g = &mesh->cells;
     const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     lane_cells alike = {.g = g, .type = type, .first = cell, .count = end - cell, .first_entry = cell * count};
     if (shape != FETCH_BY_CELL) return alike;
     int64_t next = cell;
@@ -304,7 +304,7 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     if (along < 0 || g->vertex_count > INT32_MAX || !grid_lattice_is_drawn(l, cell)) return alike;
     const int64_t left = l->drawn_end[along] - grid_index_along(&l->cell_numbering, along, cell);
     const int64_t count = left < end - cell ? left : end - cell, step = l->vertex_numbering.stride[along];
-    int64_t first = grid_lattice_first(l, cell);
+    int64_t first = grid_lattice_first_vertex(l, cell);
     alike.count = count < ROW_CELLS ? count : ROW_CELLS;
     for (int64_t n = 0; n < alike.count; n++, first += step)
         for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
@@ -322,7 +322,7 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
 /* Adds the first cells of the sequence to *t by vectorized code, and lowers *least to the smallest absolute volume of
  * these cells if that is smaller. Returns the number of cells that were added. *alone receives the number of cells
  * after them that must be added one by one. */
-static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
+static int64_t tally_cells_in_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
     /* a sequence whose grid has a lattice consists of a single cell (find_row_run()) */
@@ -350,7 +350,7 @@ static mesh_tally tally_cells_with_own_boxes(const grid *g, int64_t begin, int64
     return again;
 }
 
-MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
+MMBVH_INLINE bool may_contain_flat_cell(const mesh_tally *t, double least)
 {
     double box = 1;
     for (int axis = 0; axis < 3; axis++) box *= t->upper[axis] - t->lower[axis];
@@ -366,7 +366,7 @@ typedef struct axis_lengths {
     double lower, upper;
 } axis_lengths;
 
-static axis_lengths measure_axis(const grid_lattice *l, int axis)
+static axis_lengths measure_cell_lengths_along_axis(const grid_lattice *l, int axis)
 {
     const double *at = l->axes[axis].axis_coordinates + l->drawn_first[axis];
     const int64_t count = l->drawn_end[axis] - l->drawn_first[axis];
@@ -394,7 +394,7 @@ bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally)
     t.drawn_count = 1;
     t.size_sum = 1;
     for (int axis = 0; axis < 3; axis++) {
-        const axis_lengths along = measure_axis(g->lattice, axis);
+        const axis_lengths along = measure_cell_lengths_along_axis(g->lattice, axis);
         t.drawn_count *= g->lattice->drawn_end[axis] - g->lattice->drawn_first[axis];
         sized *= along.positive_count + along.negative_count;
         difference *= along.positive_count - along.negative_count;
@@ -426,8 +426,8 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
         double volume = 1;
         fetch_box_empty(&box);
         extend_box_by_lattice_cell(&box, g->lattice, cell);
-        tally_point(&t, box.lower);
-        tally_point(&t, box.upper);
+        tally_extend_bounds(&t, box.lower);
+        tally_extend_bounds(&t, box.upper);
         for (int axis = 0; axis < 3; axis++) {
             const double *at =
                 g->lattice->axes[axis].axis_coordinates + grid_index_along(&g->lattice->cell_numbering, axis, cell);
@@ -437,7 +437,7 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
         if (g->cell_type == GRID_QUAD)
             t.shell_count++, t.drawn_count++;
         else
-            tally_volume(&t, volume);
+            tally_drawn_cell_of_volume(&t, volume);
     }
     tally_merge(tally, &t);
     return end;
@@ -457,15 +457,15 @@ MMBVH_INLINE int64_t tally_cells(const session_mesh *mesh, int64_t begin, int64_
         if (!alike.count)
             alike =
                 shape == FETCH_LATTICE ? find_row_run(mesh, cell, end, &row) : find_uniform_run(mesh, cell, end, shape);
-        const int64_t taken = tally_lanes(&alike, &t, &least, &alone), first = cell + taken;
+        const int64_t taken = tally_cells_in_lanes(&alike, &t, &least, &alone), first = cell + taken;
         cell = first;
         while (cell < first + alone && is_good)
             if ((is_good = tally_one_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
         alike.first += taken + alone;
-        alike.first_entry += (taken + alone) * grid_type_vertices(alike.type);
+        alike.first_entry += (taken + alone) * grid_type_vertex_count(alike.type);
         alike.count -= taken + alone;
     }
-    if (may_be_flat(&t, least)) t = tally_cells_with_own_boxes(&mesh->cells, begin, cell);
+    if (may_contain_flat_cell(&t, least)) t = tally_cells_with_own_boxes(&mesh->cells, begin, cell);
     tally_merge(tally, &t);
     return cell;
 }

@@ -24,7 +24,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
  * that of the determinant of the three edges at the corner. The sign of a quad's corner shows whether the normal there
  * points to the same side as the normal at the quad's first corner. Corners have both signs if the caller stores
  * vertices in another order than the order in which they are read. */
-bool tally_has_both_signs(int type, double points[][3]);
+bool tally_has_corners_of_both_signs(int type, double points[][3]);
 
 /* Returns the signed volume of a tet, hex, wedge or pyramid, averaged over the ways to divide the cell into tets
  * (session_corners.h). It is negative if the cell is left-handed. */

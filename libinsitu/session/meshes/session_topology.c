@@ -82,26 +82,27 @@ int session_caller_type(const session_mesh *mesh, int64_t cell)
 
 /* ---- vertices of faces that the caller gives in several lists ---------------------------------------------------- */
 
-session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face)
+session_face_row session_find_vertices_of_caller_face(const insitu_mesh *mesh, int64_t face)
 {
     const bool is_apart = face >= mesh->face_count;
     if (mesh->face_lists.data) {
         const grid_array sizes = session_grid_array(&mesh->face_sizes);
         const insitu_array list = {session_face_list(mesh, face), mesh->face_lists.type, 0};
-        const int64_t size = grid_array_index(&sizes, face);
+        const int64_t size = grid_read_index(&sizes, face);
         return (session_face_row){session_index_array(mesh, &list), 0, size, size};
     }
     const grid_array offsets =
         is_apart ? session_index_array(mesh, &mesh->boundary_face_offsets)
                  : session_offset_array(mesh, &mesh->face_offsets, mesh->face_count, mesh->face_connectivity_count);
     const insitu_array *list = is_apart ? &mesh->boundary_face_connectivity : &mesh->face_connectivity;
-    const int64_t at = is_apart ? face - mesh->face_count : face, first = grid_array_index(&offsets, at);
+    const int64_t at = is_apart ? face - mesh->face_count : face, first = grid_read_index(&offsets, at);
     return (session_face_row){session_index_array(mesh, list), first,
                               (int64_t)((uint64_t)grid_offset_end(&offsets, at) - (uint64_t)first),
                               is_apart ? mesh->boundary_face_connectivity_count : mesh->face_connectivity_count};
 }
 
-static insitu_status check_row(const session_mesh *mesh, int64_t face, const session_face_row *row, base_error *error)
+static insitu_status check_vertices_of_face(const session_mesh *mesh, int64_t face, const session_face_row *row,
+                                            base_error *error)
 {
     const long long base = mesh->given.index_base, at = face + base, first = row->first, size = row->size;
     if (!mesh->given.face_lists.data) {
@@ -124,8 +125,8 @@ static int64_t count_listed_vertices(const session_mesh *mesh, base_error *error
 {
     int64_t total = 0;
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
-        const session_face_row row = session_locate_caller_face(&mesh->given, face);
-        if (check_row(mesh, face, &row, error)) return -1;
+        const session_face_row row = session_find_vertices_of_caller_face(&mesh->given, face);
+        if (check_vertices_of_face(mesh, face, &row, error)) return -1;
         total += row.size;
         if (total <= INT64_MAX / 64) continue;
         base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld, too many with those before",
@@ -147,9 +148,9 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
         !session_allocate_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
     for (int64_t face = 0; face < count; face++) {
-        const session_face_row row = session_locate_caller_face(given, face);
+        const session_face_row row = session_find_vertices_of_caller_face(given, face);
         for (int64_t i = 0; i < row.size; i++) {
-            const int64_t vertex = grid_array_index(&row.list, row.first + i);
+            const int64_t vertex = grid_read_index(&row.list, row.first + i);
             if (vertex < 0 || vertex >= given->vertex_count)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
@@ -169,7 +170,7 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
  * caller's separate list of boundary faces. */
 static const int64_t outside = INT64_MIN;
 
-session_face_sides session_find_face_sides(const insitu_mesh *given)
+session_face_sides session_get_owner_arrays(const insitu_mesh *given)
 {
     return (session_face_sides){given, session_index_array(given, &given->owner),
                                 session_index_array(given, &given->neighbour),
@@ -180,10 +181,10 @@ void session_find_cells_of_face(const session_face_sides *sides, int64_t face, i
 {
     const insitu_mesh *given = sides->given;
     const int64_t base = given->index_base, apart = face - given->face_count;
-    cells[0] = grid_array_index(apart < 0 ? &sides->owner : &sides->boundary_owner, apart < 0 ? face : apart);
+    cells[0] = grid_read_index(apart < 0 ? &sides->owner : &sides->boundary_owner, apart < 0 ? face : apart);
     cells[1] = -1;
     if (apart < 0 && face < given->neighbour_count && sides->neighbour.data)
-        cells[1] = grid_array_index(&sides->neighbour, face);
+        cells[1] = grid_read_index(&sides->neighbour, face);
     if (cells[1] == -1 - base) cells[1] = -1;
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
@@ -195,7 +196,8 @@ void session_find_cells_of_face(const session_face_sides *sides, int64_t face, i
     }
 }
 
-static insitu_status check_sides(const session_mesh *mesh, int64_t face, const int64_t cells[2], base_error *error)
+static insitu_status check_owner_and_neighbour(const session_mesh *mesh, int64_t face, const int64_t cells[2],
+                                               base_error *error)
 {
     const long long base = mesh->given.index_base, at = face + base;
     const long long last = mesh->given.cell_count + mesh->given.halo_cell_count - 1 + base;
@@ -215,15 +217,15 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
 }
 
 /* Counts the faces of each cell. The count of cell c is stored in offsets[c + 1]. */
-static insitu_status count_faces(const session_mesh *mesh, const session_face_sides *sides, const grid_array *offsets,
-                                 base_error *error)
+static insitu_status count_faces_of_cells(const session_mesh *mesh, const session_face_sides *sides,
+                                          const grid_array *offsets, base_error *error)
 {
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
         session_find_cells_of_face(sides, face, cells);
-        if (check_sides(mesh, face, cells, error)) return error->status;
+        if (check_owner_and_neighbour(mesh, face, cells, error)) return error->status;
         for (int i = 0; i < 2 && cells[i] >= 0; i++)
-            session_store_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
+            session_store_index(offsets, cells[i] + 1, grid_read_index(offsets, cells[i] + 1) + 1);
     }
     return INSITU_OK;
 }
@@ -231,41 +233,40 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
 /* Converts the numbers of faces in t->offsets into offsets, and then stores the index of each face in the lists of its
  * cells. Storing a face advances the offset of its cell, which finally is the offset of the next cell; the last loop
  * shifts all offsets back. */
-static void store_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
+static void store_faces_of_cells(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
-        session_store_index(&t->offsets, c + 1,
-                            grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
+        session_store_index(&t->offsets, c + 1, grid_read_index(&t->offsets, c + 1) + grid_read_index(&t->offsets, c));
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
         session_find_cells_of_face(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
-            const int64_t at = grid_array_index(&t->offsets, cells[i]);
+            const int64_t at = grid_read_index(&t->offsets, cells[i]);
             session_store_index(&t->connectivity, at, face);
             session_store_index(&t->offsets, cells[i], at + 1);
         }
     }
-    for (int64_t c = count; c > 0; c--) session_store_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
+    for (int64_t c = count; c > 0; c--) session_store_index(&t->offsets, c, grid_read_index(&t->offsets, c - 1));
     session_store_index(&t->offsets, 0, 0);
 }
 
 /* Computes the list of the faces of each cell from the owners and neighbours of faces. */
-static insitu_status list_faces(session_mesh *mesh, base_error *error)
+static insitu_status list_faces_of_cells(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
-    const session_face_sides sides = session_find_face_sides(given);
+    const session_face_sides sides = session_get_owner_arrays(given);
     const int64_t faces = session_face_count(given), most = faces + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;
     if (!session_allocate_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error))
         return error->status;
-    if (count_faces(mesh, &sides, &t->offsets, error)) return error->status;
+    if (count_faces_of_cells(mesh, &sides, &t->offsets, error)) return error->status;
     int64_t total = 0;
-    for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
+    for (int64_t c = 0; c < given->cell_count; c++) total += grid_read_index(&t->offsets, c + 1);
     if (!session_allocate_indices(mesh, "cells' faces", total, faces, &t->connectivity, error)) return error->status;
-    store_faces(mesh, &sides, t);
+    store_faces_of_cells(mesh, &sides, t);
     t->connectivity_count = total;
     t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
     return INSITU_OK;
@@ -292,7 +293,7 @@ static bool read_face_ring(const session_mesh *mesh, int64_t face, face_ring *ri
     if (to - from < 3 || to - from > 4) return false;
     ring->count = (int)(to - from);
     for (int i = 0; i < ring->count; i++) {
-        ring->vertex[i] = grid_array_index(&g->face_connectivity, from + i);
+        ring->vertex[i] = grid_read_index(&g->face_connectivity, from + i);
         if (ring->vertex[i] < 0 || ring->vertex[i] >= g->vertex_count) return false;
     }
     return true;
@@ -343,8 +344,8 @@ static bool are_distinct(const int64_t *vertices, int count)
  * base; side_size: number of vertices that each face with an edge of the base must have. vertices: receives the cell's
  * vertices in VTK's order, except that the cell may be left-handed. Returns false if the faces do not form such a
  * cell. */
-static bool build_on_base(const face_ring *rings, int count, int base, int side_size,
-                          int64_t vertices[GRID_MAX_CELL_VERTICES])
+static bool build_cell_on_base_face(const face_ring *rings, int count, int base, int side_size,
+                                    int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
     unsigned used = 1u << base;
@@ -380,8 +381,8 @@ static void swap_vertices(int64_t *vertices, int i, int j)
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
-    const int count = grid_type_vertices(type);
-    for (int i = 0; i < count; i++) grid_vertex(g, vertices[i], points[i]);
+    const int count = grid_type_vertex_count(type);
+    for (int i = 0; i < count; i++) grid_read_vertex_position(g, vertices[i], points[i]);
     if (!(tally_signed_volume(type, points) < 0)) return;
     swap_vertices(vertices, 1, n - 1);
     if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
@@ -401,13 +402,13 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
     grid_cell_faces(g, cell, &first, &end);
     const int count = end - first <= MOST_FACES ? (int)(end - first) : 0;
     for (int i = 0; i < count; i++) {
-        if (!read_face_ring(mesh, grid_array_index(&g->connectivity, first + i), &rings[i])) return GRID_POLYHEDRON;
+        if (!read_face_ring(mesh, grid_read_index(&g->connectivity, first + i), &rings[i])) return GRID_POLYHEDRON;
         triangles += rings[i].count == 3;
     }
     for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++) {
         if (count != shapes[s].triangles + shapes[s].quads || triangles != shapes[s].triangles) continue;
         while (rings[base].count != shapes[s].base) base++;
-        if (!build_on_base(rings, count, base, shapes[s].side, vertices)) return GRID_POLYHEDRON;
+        if (!build_cell_on_base_face(rings, count, base, shapes[s].side, vertices)) return GRID_POLYHEDRON;
         make_right_handed(g, shapes[s].type, shapes[s].base, vertices);
         return shapes[s].type;
     }
@@ -436,9 +437,9 @@ static bool has_good_entries(const session_mesh *mesh, int64_t cell, int type)
     int64_t first, end;
     grid_cell_faces(g, cell, &first, &end);
     if (first < 0 || end > mesh->topology.connectivity_count || end < first) return false;
-    if (type != GRID_POLYHEDRON && end - first != grid_type_vertices(type)) return false;
+    if (type != GRID_POLYHEDRON && end - first != grid_type_vertex_count(type)) return false;
     for (int64_t i = first; i < end; i++) {
-        const int64_t index = grid_array_index(&g->connectivity, i);
+        const int64_t index = grid_read_index(&g->connectivity, i);
         if (index < 0 || index >= limit) return false;
     }
     return true;
@@ -448,7 +449,7 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
 {
     const int type = grid_cell_type(&mesh->cells, cell);
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
-    if ((grid_type_vertices(type) == 0 && type != GRID_POLYHEDRON) || !has_good_entries(mesh, cell, type)) {
+    if ((grid_type_vertex_count(type) == 0 && type != GRID_POLYHEDRON) || !has_good_entries(mesh, cell, type)) {
         r->is_faulty = true;
         return;
     }
@@ -458,7 +459,7 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
     r->polyhedron_count += type == GRID_POLYHEDRON;
     r->recognised_count += now != type;
     r->type_counts[now]++;
-    r->entry_count += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
+    r->entry_count += now == GRID_POLYHEDRON ? end - first : grid_type_vertex_count(now);
 }
 
 static void recognise_cells(const session_mesh *mesh, int threads, recognition *r)
@@ -490,24 +491,24 @@ static int find_common_type(const recognition *r, int64_t count)
     return type;
 }
 
-static void store_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
+static void store_recognised_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
 {
     const grid *g = &mesh->cells;
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
     if (type == grid_cell_type(g, cell)) {
         grid_cell_faces(g, cell, &first, &end);
-        for (int64_t i = first; i < end; i++) session_store_index(out, at++, grid_array_index(&g->connectivity, i));
+        for (int64_t i = first; i < end; i++) session_store_index(out, at++, grid_read_index(&g->connectivity, i));
         return;
     }
     recognise_polyhedron(mesh, cell, vertices);
-    for (int i = 0; i < grid_type_vertices(type); i++) session_store_index(out, at++, vertices[i]);
+    for (int i = 0; i < grid_type_vertex_count(type); i++) session_store_index(out, at++, vertices[i]);
 }
 
 static void store_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
 {
     int64_t at = 0;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) {
-        int64_t first = 0, end = grid_type_vertices(r->types[cell]);
+        int64_t first = 0, end = grid_type_vertex_count(r->types[cell]);
         if (r->types[cell] == GRID_POLYHEDRON) grid_cell_faces(&mesh->cells, cell, &first, &end);
         at += end - first;
         session_store_index(out, cell + 1, at);
@@ -520,7 +521,7 @@ static insitu_status store_recognised_cells(session_mesh *mesh, recognition *r, 
 {
     session_topology *t = &mesh->topology;
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
-    const int type = find_common_type(r, count), size = grid_type_vertices(type);
+    const int type = find_common_type(r, count), size = grid_type_vertex_count(type);
     grid_array offsets = {0}, connectivity;
     if (!session_allocate_indices(mesh, "recognised cells", r->entry_count, vertices > faces ? vertices : faces,
                                   &connectivity, error))
@@ -535,8 +536,8 @@ static insitu_status store_recognised_cells(session_mesh *mesh, recognition *r, 
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t cell = 0; cell < count; cell++)
-            store_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell),
-                       &connectivity);
+            store_recognised_cell(mesh, cell, r->types[cell], type ? cell * size : grid_read_index(&offsets, cell),
+                                  &connectivity);
         region_leave();
     }
     session_drop_array(&t->offsets);
@@ -553,7 +554,7 @@ static insitu_status store_recognised_cells(session_mesh *mesh, recognition *r, 
     return INSITU_OK;
 }
 
-static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error *error)
+static insitu_status recognise_polyhedra_of_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
     const grid *g = &mesh->cells;
@@ -583,7 +584,8 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
 /* Returns whether some cells may be polyhedra. */
 static bool may_have_polyhedra(const grid *g)
 {
-    return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);
+    return g->cell_count && g->offsets.data && grid_may_have_polyhedra(g) &&
+           (g->cell_types || g->cell_type == GRID_POLYHEDRON);
 }
 
 /* Marks the session's copies of cell values as stale, because they contain one value for each piece of a cell. */
@@ -601,14 +603,14 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     session_select_grid_arrays(mesh);
     if ((mesh->given.face_lists.data && mesh->given.face_sizes.data) || mesh->given.boundary_face_count)
         status = copy_face_lists(mesh, error);
-    if (!status && session_has_owners(&mesh->given)) status = list_faces(mesh, error);
+    if (!status && session_has_face_owners(&mesh->given)) status = list_faces_of_cells(mesh, error);
     if (!status && session_has_higher_order(&mesh->given))
         status = session_split_cells(mesh, threads, error);
-    else if (!status && session_is_reordered(&mesh->given))
+    else if (!status && session_must_reorder_vertices(&mesh->given))
         status = session_order_cells(mesh, threads, error);
     session_select_grid_arrays(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
-        status = recognise_mesh(mesh, threads, error);
+        status = recognise_polyhedra_of_mesh(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
     session_select_grid_arrays(mesh);
     mesh->topology.is_made = !status;

@@ -19,7 +19,7 @@ typedef struct session_face_row {
     int64_t limit;       /* number of entries of `list` */
 } session_face_row;
 
-session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face);
+session_face_row session_find_vertices_of_caller_face(const insitu_mesh *mesh, int64_t face);
 
 /* The caller's arrays that give the two cells of each face: the cell that owns the face (its owner), and the cell on
  * the other side (its neighbour). */
@@ -28,7 +28,7 @@ typedef struct session_face_sides {
     grid_array owner, neighbour, boundary_owner;
 } session_face_sides;
 
-session_face_sides session_find_face_sides(const insitu_mesh *given);
+session_face_sides session_get_owner_arrays(const insitu_mesh *given);
 /* Finds the two cells of a face. cells[i] is negative if the cell is missing; if only one cell is missing, it is
  * cells[1]. */
 void session_find_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);

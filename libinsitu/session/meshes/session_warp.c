@@ -57,9 +57,9 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
     }
-    if (was_on) session_end_finer_mesh(meshes, mesh);
+    if (was_on) session_free_finer_lattices_of_mesh(meshes, mesh);
     restore_coordinates(mesh);
-    session_drop_warp(mesh);
+    session_drop_moved_coordinates(mesh);
     if (was_on) {
         mark_moved(meshes, mesh);
         session_select_grid_arrays(mesh);
@@ -70,9 +70,9 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 
 /* Returns the type of the moved coordinates along an axis. If the caller gives no z coordinates, the moved ones get the
  * type of the x coordinates. */
-static insitu_type moved_type(const insitu_mesh *given, int axis)
+static insitu_type choose_type_of_moved_coordinates(const insitu_mesh *given, int axis)
 {
-    if (session_has_axes(given)) return INSITU_FLOAT64;
+    if (session_has_axis_coordinates(given)) return INSITU_FLOAT64;
     return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
 }
 
@@ -82,8 +82,10 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
 {
     enum { IN_PLANE = 3, ALL = 7 };
     const insitu_mesh *given = &mesh->given;
-    const bool has_z = component_count == 3 || given->coordinates[2].data || session_has_axes(given);
-    const insitu_type types[3] = {moved_type(given, 0), moved_type(given, 1), moved_type(given, 2)};
+    const bool has_z = component_count == 3 || given->coordinates[2].data || session_has_axis_coordinates(given);
+    const insitu_type types[3] = {choose_type_of_moved_coordinates(given, 0),
+                                  choose_type_of_moved_coordinates(given, 1),
+                                  choose_type_of_moved_coordinates(given, 2)};
     session_warp *warp = &mesh->warp;
     return session_reserve_coordinates(&warp->coordinate_memory, warp->coordinates, given->vertex_count,
                                        has_z ? ALL : IN_PLANE, types, &warp->bytes, is_new);
@@ -100,8 +102,8 @@ typedef struct moved_axis {
 /* Stores a vertex's moved coordinate. Returns whether it differs from the coordinate stored before. */
 static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex, int64_t tuple)
 {
-    double coordinate = grid_array_number(&axis->from, vertex);
-    if (axis->by.data) coordinate += scale * grid_array_number(&axis->by, tuple);
+    double coordinate = grid_read_number(&axis->from, vertex);
+    if (axis->by.data) coordinate += scale * grid_read_number(&axis->by, tuple);
     return session_store_coordinate(axis->to, vertex, coordinate);
 }
 
@@ -118,7 +120,7 @@ static bool move_vertices(const session_mesh *mesh, const session_displacement *
         region_enter();
 #pragma omp for schedule(static) reduction(min : first_bad) reduction(|| : is_moved) nowait
         for (int64_t v = 0; v < count; v++) {
-            const int64_t tuple = by->index.data ? grid_array_index(&by->index, v) : v;
+            const int64_t tuple = by->index.data ? grid_read_index(&by->index, v) : v;
             if (tuple < 0 || tuple >= by->count) {
                 first_bad = v < first_bad ? v : first_bad;
                 continue;
@@ -132,28 +134,28 @@ static bool move_vertices(const session_mesh *mesh, const session_displacement *
     return is_moved;
 }
 
-static insitu_status describe_index(const session_mesh *mesh, const session_displacement *by, int64_t vertex,
-                                    base_error *error)
+static insitu_status report_invalid_tuple_index(const session_mesh *mesh, const session_displacement *by,
+                                                int64_t vertex, base_error *error)
 {
     const long long base = mesh->given.index_base;
     return base_fail(error, INSITU_ERROR_FIELD,
                      "mesh \"%s\": field \"%s\": the index of vertex %lld is %lld, outside %lld..%lld (index_base is "
                      "%lld)",
                      mesh->label, mesh->fields[by->field].given.name, (long long)vertex + base,
-                     (long long)grid_array_index(&by->index, vertex) + base, base, (long long)by->count - 1 + base,
+                     (long long)grid_read_index(&by->index, vertex) + base, base, (long long)by->count - 1 + base,
                      base);
 }
 
 /* Computes the moved coordinates from the caller's coordinates. *differ is set if a moved coordinate has changed or its
  * memory is new. */
-static insitu_status compute_coordinates(session_mesh *mesh, const session_displacement *by, int threads, bool *differ,
-                                         base_error *error)
+static insitu_status compute_moved_coordinates(session_mesh *mesh, const session_displacement *by, int threads,
+                                               bool *differ, base_error *error)
 {
     moved_axis axes[3] = {{.to = NULL}};
     int64_t bad;
     if (!reserve_coordinates(mesh, by->component_count, differ))
         return session_fail_for_memory(error, mesh->given.vertex_count * 24, "coordinates of a warped mesh");
-    const bool has_axes = session_has_axes(&mesh->given);
+    const bool has_axes = session_has_axis_coordinates(&mesh->given);
     insitu_status status = has_axes ? session_compute_axis_coordinates(mesh, error) : INSITU_OK;
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
@@ -165,7 +167,7 @@ static insitu_status compute_coordinates(session_mesh *mesh, const session_displ
     }
     *differ = move_vertices(mesh, by, (const moved_axis *)axes, threads, &bad) || *differ;
     if (has_axes) session_drop_axes(&mesh->lattice);
-    return bad < mesh->given.vertex_count ? describe_index(mesh, by, bad, error) : INSITU_OK;
+    return bad < mesh->given.vertex_count ? report_invalid_tuple_index(mesh, by, bad, error) : INSITU_OK;
 }
 
 insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, const session_displacement *by, int threads,
@@ -175,10 +177,10 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     const bool was_on = warp->is_applied;
     bool differ = !was_on;
     if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
-    session_end_finer_mesh(meshes, mesh); /* finer lattices must be computed again from the moved nodes */
+    session_free_finer_lattices_of_mesh(meshes, mesh); /* finer lattices must be computed again from the moved nodes */
     if (warp->is_stale) session_convert_arrays(mesh, threads);
     restore_coordinates(mesh);
-    if (compute_coordinates(mesh, by, threads, &differ, error)) {
+    if (compute_moved_coordinates(mesh, by, threads, &differ, error)) {
         if (was_on) mark_moved(meshes, mesh);
         session_select_grid_arrays(mesh);
         return error->status;

@@ -86,7 +86,7 @@ session_bin_walk session_begin_bin_walk(const session_bins *bins, const double l
     return walk;
 }
 
-bool session_next_binned(session_bin_walk *walk, int64_t *point)
+bool session_next_point_in_bins(session_bin_walk *walk, int64_t *point)
 {
     while (walk->next == walk->end) {
         if (++walk->bin[1] > walk->last_bin[1]) {

@@ -22,7 +22,7 @@ void session_bins_free(session_bins *bins);
 /* Iterator over the points near a box. It visits all points inside the box, and some outside.
  *
  *     session_bin_walk walk = session_begin_bin_walk(&bins, lower, upper, margin);
- *     while (session_next_binned(&walk, &point)) ... */
+ *     while (session_next_point_in_bins(&walk, &point)) ... */
 typedef struct session_bin_walk {
     const session_bins *bins;
     int64_t first_bin[3], last_bin[3]; /* range of bins that the box touches, along each axis */
@@ -34,6 +34,6 @@ typedef struct session_bin_walk {
 
 session_bin_walk session_begin_bin_walk(const session_bins *bins, const double lower[3], const double upper[3],
                                         double margin);
-bool session_next_binned(session_bin_walk *walk, int64_t *point);
+bool session_next_point_in_bins(session_bin_walk *walk, int64_t *point);
 
 #endif

@@ -99,7 +99,7 @@ static inline session_face_loop session_find_face_loop(const session_cell_faces 
     }
     int64_t end;
     out.list = &faces->cells->face_connectivity;
-    grid_face_vertices(faces->cells, grid_array_index(&faces->cells->connectivity, faces->first + face), &out.first,
+    grid_face_vertices(faces->cells, grid_read_index(&faces->cells->connectivity, faces->first + face), &out.first,
                        &end);
     out.size = end - out.first;
     return out;
@@ -108,7 +108,7 @@ static inline session_face_loop session_find_face_loop(const session_cell_faces 
 static inline int64_t session_face_vertex(const session_face_loop *loop, int64_t i)
 {
     if (loop->corners) return loop->faces->vertices[(int)loop->corners[i]];
-    return grid_array_index(loop->list, loop->first + i);
+    return grid_read_index(loop->list, loop->first + i);
 }
 
 #endif

@@ -13,7 +13,7 @@ enum { PARTS = 96 };
 
 /* ---- reading and measuring faces --------------------------------------------------------------------------------- */
 
-double session_position_rounding(const session_mesh *mesh)
+double session_bound_position_rounding(const session_mesh *mesh)
 {
     double rounding = 0;
     for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
@@ -61,13 +61,13 @@ static void measure_face(session_coarse_face *f, double side)
 
 /* Returns the parameter `side` of measure_face(): 1 if f->normal points away from the cell, -1 if it points to the
  * cell, 0 if it is perpendicular to the line between the centres of cell and face. */
-static double find_cell_side(const grid *g, int64_t cell, const session_coarse_face *f)
+static double find_normal_sign(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], position[3];
     int64_t vertex, count = 0;
     grid_walk walk = grid_walk_cell(g, cell);
     while (grid_walk_next(&walk, &vertex)) {
-        grid_vertex(g, vertex, position);
+        grid_read_vertex_position(g, vertex, position);
         for (int axis = 0; axis < 3; axis++) sums[axis] += position[axis];
         count++;
     }
@@ -87,7 +87,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     out->count = (int)loop.size;
     for (int i = 0; i < out->count; i++) {
         out->vertices[i] = session_face_vertex(&loop, i);
-        grid_vertex(g, out->vertices[i], out->corner_positions[i]);
+        grid_read_vertex_position(g, out->vertices[i], out->corner_positions[i]);
     }
     out->box = find_bounding_box((const double(*)[3])out->corner_positions, out->count);
     out->diameter = session_point_distance(out->box.lower, out->box.upper);
@@ -95,7 +95,8 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
 }
 
 /* Returns whether, along `direction`, the position lies above all corners or below all corners by more than `slack`. */
-static bool is_beyond(const session_face_outline *f, const double position[3], const double direction[3], double slack)
+static bool is_beyond_corners(const session_face_outline *f, const double position[3], const double direction[3],
+                              double slack)
 {
     const double at = vector3_dot(direction, position), most = slack * sqrt(vector3_dot(direction, direction));
     double low = vector3_dot(direction, f->corner_positions[0]), high = low;
@@ -107,17 +108,17 @@ static bool is_beyond(const session_face_outline *f, const double position[3], c
     return at < low - most || at > high + most;
 }
 
-bool session_may_outline_contain(const session_face_outline *f, const double position[3], double slack)
+bool session_can_face_contain_position(const session_face_outline *f, const double position[3], double slack)
 {
     double edges[4][3], normal[3], across[3];
     for (int i = 0; i < f->count; i++)
         for (int axis = 0; axis < 3; axis++)
             edges[i][axis] = f->corner_positions[(i + 1) % f->count][axis] - f->corner_positions[i][axis];
     vector3_cross(edges[0], edges[1], normal);
-    if (is_beyond(f, position, normal, slack)) return false;
+    if (is_beyond_corners(f, position, normal, slack)) return false;
     for (int i = 0; i < f->count; i++) {
         vector3_cross(normal, edges[i], across);
-        if (is_beyond(f, position, across, slack)) return false;
+        if (is_beyond_corners(f, position, across, slack)) return false;
     }
     return true;
 }
@@ -144,7 +145,7 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     }
     measure_face(out, 1);
     if (!(out->area > 0)) return false;
-    measure_face(out, find_cell_side(g, face->cell, out));
+    measure_face(out, find_normal_sign(g, face->cell, out));
     return true;
 }
 

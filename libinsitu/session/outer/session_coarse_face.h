@@ -35,7 +35,7 @@ typedef struct session_face_outline {
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
 /* Returns false only if a position in the outline's box is certainly more than `slack` away from the face: the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
-bool session_may_outline_contain(const session_face_outline *outline, const double position[3], double slack);
+bool session_can_face_contain_position(const session_face_outline *outline, const double position[3], double slack);
 
 /* Reads a face. vertices: receives the face's vertices, in the order of out->corner_positions. Returns false if the
  * face is not a triangle or quad of a cell with a volume, or if its area is 0. */
@@ -55,7 +55,7 @@ bool session_is_at_corner(const session_coarse_face *face, const double position
 bool session_find_weights(const session_coarse_face *face, const double position[3], double slack, double weights[4]);
 
 /* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */
-double session_position_rounding(const session_mesh *mesh);
+double session_bound_position_rounding(const session_mesh *mesh);
 
 /* Returns the distance between two points. */
 double session_point_distance(const double a[3], const double b[3]);

@@ -92,19 +92,19 @@ static void find_box_bounds(const session_level_box *box, double lower[3], doubl
     }
 }
 
-static bool is_level_block(const session_mesh *mesh)
+static bool is_refined_block(const session_mesh *mesh)
 {
-    return mesh->is_given && session_has_levels(&mesh->given) && mesh->cells.lattice;
+    return mesh->is_given && session_has_refinement_level(&mesh->given) && mesh->cells.lattice;
 }
 
 /* Computes the common box of this rank: the bounding box of its refined blocks, in units of cells of the coarsest
  * level. It is extended by one such cell, which is far more than rounding requires. */
-static session_box find_common_box(const session_meshes *meshes)
+static session_box find_bounding_box_of_rank(const session_meshes *meshes)
 {
     session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < meshes->count; i++) {
         double lower[3], upper[3];
-        if (!is_level_block(meshes->items[i])) continue;
+        if (!is_refined_block(meshes->items[i])) continue;
         const session_level_box box = make_level_box(meshes->items[i], 0);
         find_box_bounds(&box, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
@@ -119,7 +119,7 @@ static bool list_own_boxes(const session_meshes *meshes, cover_search *s)
 {
     s->boxes = base_alloc((size_t)(meshes->count + 1) * sizeof *s->boxes);
     for (int i = 0; i < meshes->count && s->boxes; i++) {
-        if (!is_level_block(meshes->items[i])) continue;
+        if (!is_refined_block(meshes->items[i])) continue;
         s->boxes[s->count++] = make_level_box(meshes->items[i], s->team->rank);
     }
     return s->boxes != NULL;
@@ -137,8 +137,8 @@ static bool intersects_box(const session_level_box *box, const session_box *comm
 }
 
 /* For each other rank, packs the boxes of this rank's blocks that intersect the common box of the other rank
- * (find_common_box()). If mail->words is NULL, the words are only counted. */
-static void write_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
+ * (find_bounding_box_of_rank()). If mail->words is NULL, the words are only counted. */
+static void pack_or_count_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
 {
     mail->total = 0;
     for (int rank = 0; rank < s->team->ranks; rank++) {
@@ -156,9 +156,9 @@ static bool pack_boxes(const cover_search *s, const session_box *commons, sessio
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    write_boxes(s, commons, mail);
+    pack_or_count_boxes(s, commons, mail);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
-    if (mail->words) write_boxes(s, commons, mail);
+    if (mail->words) pack_or_count_boxes(s, commons, mail);
     return mail->words != NULL;
 }
 
@@ -176,7 +176,7 @@ static bool receive_boxes(cover_search *s, const session_mail *in)
 static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshes, base_error *error)
 {
     session_mail out = {0}, in = {0};
-    const session_box own = find_common_box(meshes);
+    const session_box own = find_bounding_box_of_rank(meshes);
     session_box *commons = base_alloc((size_t)s->team->ranks * sizeof *commons);
     if (!commons) session_fail_for_memory(error, s->team->ranks * (int64_t)sizeof *commons, "boxes of blocks");
     insitu_status status = session_agree(s->team->comm, error);
@@ -301,7 +301,7 @@ static void mark_cells(const session_mesh *mesh, const overlap *cells, unsigned 
 }
 
 /* Returns whether some cell of the overlap is covered only in part, that is, has the bit IS_CUT without IS_HIDDEN. */
-static bool has_cut_cell(const session_mesh *mesh, const overlap *cells, const unsigned char *covered)
+static bool has_partly_covered_cell(const session_mesh *mesh, const overlap *cells, const unsigned char *covered)
 {
     const int64_t stride = mesh->lattice.cells.cell_numbering.stride[0];
     for (row_walk row = walk_rows(mesh, cells); next_row(&row);)
@@ -332,7 +332,7 @@ static finer_walk walk_finer(const cover_search *s, const session_mesh *mesh)
 static bool next_finer(finer_walk *w)
 {
     int64_t near;
-    while (session_next_binned(&w->bins, &near)) {
+    while (session_next_point_in_bins(&w->bins, &near)) {
         w->fine = &w->search->boxes[w->search->finer_bins.boxes[near]];
         if (w->fine->mesh == w->box.mesh && is_finer(w->fine, &w->box) && find_overlap(&w->box, w->fine, &w->cells))
             return true;
@@ -363,7 +363,7 @@ static void report_partly_covered_cells(const cover_search *s, session_mesh *mes
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
         const int axis = w.cells.cut_axis;
-        if (axis >= 0 && has_cut_cell(mesh, &w.cells, covered))
+        if (axis >= 0 && has_partly_covered_cell(mesh, &w.cells, covered))
             mesh->misfit = (session_misfit){true, axis, w.fine->block, w.fine->refinement[axis], (int)w.fine->rank};
     }
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
@@ -380,10 +380,10 @@ static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *co
     const grid g = {
         .ghosts = flags.data, .ghosts_stride = flags.stride, .ghosts_bytes = (int)session_type_size(ghosts->type)};
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++)
-        if (grid_is_flagged(&g, cell)) covered[cell] |= IS_HIDDEN;
+        if (grid_is_flagged_as_ghost(&g, cell)) covered[cell] |= IS_HIDDEN;
 }
 
-static bool update_block(const cover_search *s, session_meshes *meshes, session_mesh *mesh)
+static bool update_covered_cells_of_block(const cover_search *s, session_meshes *meshes, session_mesh *mesh)
 {
     unsigned char *covered;
     bool has_cuts;
@@ -409,7 +409,7 @@ insitu_status session_update_covered_cells(session_meshes *meshes, const session
     insitu_status status = exchange_boxes(&s, meshes, error);
     bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer_bins);
     for (int i = 0; i < meshes->count && is_done; i++)
-        if (is_level_block(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
+        if (is_refined_block(meshes->items[i])) is_done = update_covered_cells_of_block(&s, meshes, meshes->items[i]);
     if (!status && !error->status && !is_done)
         session_fail_for_memory(error, s.count * 100, "cells that finer blocks cover");
     if (is_done) {
@@ -458,7 +458,7 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
     const session_level_box *finest = NULL;
     session_bin_walk walk = session_begin_bin_walk(&bins->bins, at, at, bins->largest_half_width);
     int64_t near;
-    while (session_next_binned(&walk, &near)) {
+    while (session_next_point_in_bins(&walk, &near)) {
         const session_level_box *box = &meshes->level_boxes[bins->boxes[near]];
         double lower[3], upper[3];
         bool is_in = box->mesh == mesh && (!finest || is_finer(box, finest));
@@ -490,13 +490,14 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
 {
     box_bins bins = {.count = 0};
     bool has_levels = false;
-    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(session_find_source_part(parts[i].mesh));
+    for (int i = 0; i < count; i++)
+        has_levels = has_levels || is_refined_block(session_find_source_part(parts[i].mesh));
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
         /* the cells and faces of a mirror image are numbered as those of its source */
         const session_mesh *mesh = session_find_source_part(parts[i].mesh);
-        if (is_level_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
+        if (is_refined_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);
     }

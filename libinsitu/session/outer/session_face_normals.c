@@ -34,23 +34,23 @@ void session_face_normals_free(session_face_normals *normals)
 static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t cell)
 {
     const session_rows *rows = &n->polynomials.rows;
-    const int count = (int)session_row_size(rows, cell);
+    const int count = (int)session_count_nodes_of_cell(rows, cell);
     for (int i = 0; i < count; i++)
-        grid_vertex(&mesh->cells, session_find_row_vertex(rows, cell, i), n->positions + 3 * i);
+        grid_read_vertex_position(&mesh->cells, session_find_vertex_of_node(rows, cell, i), n->positions + 3 * i);
     n->cell = cell;
     n->derivatives = session_find_derivatives_of_cell(&n->polynomials, cell, n->positions, 3);
 }
 
 /* Returns the position of a vertex in the list of nodes (row) of one of the caller's cells, or -1 if the cell does not
  * have the vertex. */
-static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
+static int find_node_of_vertex(const session_rows *rows, int64_t cell, int64_t vertex)
 {
-    const int count = (int)session_row_size(rows, cell);
+    const int count = (int)session_count_nodes_of_cell(rows, cell);
     /* if cells are refined (session_finer.h), the nodes of a cell have consecutive vertex indices */
-    const int64_t guess = vertex - session_find_row_vertex(rows, cell, 0);
-    if (guess >= 0 && guess < count && session_find_row_vertex(rows, cell, (int)guess) == vertex) return (int)guess;
+    const int64_t guess = vertex - session_find_vertex_of_node(rows, cell, 0);
+    if (guess >= 0 && guess < count && session_find_vertex_of_node(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)
-        if (session_find_row_vertex(rows, cell, i) == vertex) return i;
+        if (session_find_vertex_of_node(rows, cell, i) == vertex) return i;
     return -1;
 }
 
@@ -79,9 +79,9 @@ bool session_find_face_normal(session_face_normals *normals, const session_mesh 
     double plane[3], tangents[3][3] = {{0}}, product[3];
     for (int x = 0; x < 3; x++) out[x] = 0;
     if (!session_has_face_normals(normals, mesh, cell)) return false;
-    const int node = find_node(rows, cell, vertex), axes = normals->derivatives->axis_count;
+    const int node = find_node_of_vertex(rows, cell, vertex), axes = normals->derivatives->axis_count;
     if (node < 0) return false;
-    session_find_rim_plane(&rows->kinds[session_find_kind_of_cell(rows, cell)].nodes, face, plane);
+    session_find_face_plane_normal(&rows->kinds[session_find_kind_of_cell(rows, cell)].nodes, face, plane);
     for (int a = 0; a < axes; a++) find_tangent(normals, node, a, tangents[a]);
     for (int a = 0; a < 3; a++) {
         vector3_cross(tangents[(a + 1) % 3], tangents[(a + 2) % 3], product);

@@ -108,14 +108,14 @@ static bool store_border(const session_mesh *mesh, session_outer *outer, const u
     return true;
 }
 
-bool session_has_twins(const session_mesh_group *mesh_group)
+bool session_merges_close_vertices(const session_mesh_group *mesh_group)
 {
     return mesh_group->count > 1 || (mesh_group->meshes[0]->is_refined && !mesh_group->by_id);
 }
 
 /* Fills the input out[i] of session_find_outer_faces() for each of `count` parts of one mesh: stores the part, and
  * allocates is_border, one byte per vertex of the part. Returns false if memory runs out. */
-static bool list_part_faces(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
+static bool prepare_face_parts(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
     for (int i = 0; i < count && is_done; i++) {
@@ -137,7 +137,7 @@ static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, i
     session_outer *outers = base_calloc((size_t)count + 1, sizeof *outers);
     session_face_part *of = base_calloc((size_t)count + 1, sizeof *of);
     for (int i = 0; i < count && outers && of; i++) of[i].outer = &outers[i];
-    if (!outers || !of || !list_part_faces(parts, first, count, of))
+    if (!outers || !of || !prepare_face_parts(parts, first, count, of))
         session_fail_for_memory(error, count * 100LL, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &mesh_group->meshes[m]->homes, team, error);
@@ -147,7 +147,7 @@ static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, i
     if (!status) status = session_agree(team->comm, error);
     for (int i = 0; i < count && !status; i++) borders[i].cells_hash = mesh_group->meshes[m]->cells_hash;
     for (int i = 0; i < count && of && outers; i++) {
-        session_drop_outer(&outers[i], true);
+        session_drop_outer_surface(&outers[i], true);
         base_free(of[i].is_border);
     }
     base_free(outers);
@@ -190,7 +190,8 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
     if (!status) status = find_stale_borders(mesh_group, parts, team, stale, error);
     for (int m = 0; m < mesh_group->count && !status; m++)
         if (stale[m]) status = update_mesh_borders(mesh_group, m, parts, team, error);
-    if (!status && session_has_twins(mesh_group)) status = session_find_twins(mesh_group, parts, team, error);
+    if (!status && session_merges_close_vertices(mesh_group))
+        status = session_find_coincident_vertices(mesh_group, parts, team, error);
     if (!status) status = session_agree(team->comm, error);
     if (!status) hanging->twins_version = mesh_group->positions_hash;
     base_free(stale);
@@ -217,7 +218,7 @@ static bool list_candidates(hanging_search *s)
             if (group < 0 || is_listed[group]) continue;
             candidate *c = &s->candidates[s->candidate_count++];
             *c = (candidate){.group = group, .hit_list = -1, .corner_list = -1, .face = -1};
-            grid_vertex(&basis->meshes[m]->cells, v, c->position);
+            grid_read_vertex_position(&basis->meshes[m]->cells, v, c->position);
             is_listed[group] = 1;
         }
     base_free(is_listed);
@@ -267,11 +268,11 @@ static bool may_candidate_lie_on_face(const hanging_search *s, int m, const sess
 {
     session_bin_walk walk = session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, slack);
     int64_t near;
-    while (session_next_binned(&walk, &near)) {
+    while (session_next_point_in_bins(&walk, &near)) {
         const candidate *c = &s->candidates[near];
         if (!is_in_box(&f->box, c->position, slack)) continue;
         if ((needs_hit ? c->hit_list >= 0 : !is_corner_of(s, m, f, c)) &&
-            session_may_outline_contain(f, c->position, slack))
+            session_can_face_contain_position(f, c->position, slack))
             return true;
     }
     return false;
@@ -289,7 +290,7 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    /* upper bound of the value that find_face_slack() returns for this face, once the face has been read */
+    /* upper bound of the value that compute_face_tolerance() returns for this face, once the face has been read */
     const double slack = relative_slack * f.diameter + s->rounding;
     return may_candidate_lie_on_face(s, m, &f, slack, needs_hit) ||
            (!needs_hit && intersects_rank_box(s, &f.box, slack));
@@ -355,14 +356,14 @@ static bool read_own_faces(hanging_search *s)
     return true;
 }
 
-static double find_face_slack(const hanging_search *s, const session_coarse_face *f)
+static double compute_face_tolerance(const hanging_search *s, const session_coarse_face *f)
 {
     return relative_slack * f->width + s->rounding;
 }
 
 /* Packs, for each other rank near this one, the faces of this rank that intersect the other rank's box. sent: receives
  * the index of each packed face. If mail->words is NULL, the words are only counted. */
-static void write_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
+static void pack_or_count_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
     const session_homes *homes = s->basis->mesh_group->homes;
     mail->total = 0;
@@ -370,7 +371,7 @@ static void write_faces(const hanging_search *s, session_mail *mail, int64_t *se
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->own_count && homes->near_ranks[n] != s->team->rank; i++) {
             const session_coarse_face *f = &s->faces[i].face;
-            if (!do_boxes_intersect(&f->box, &homes->boxes[n], find_face_slack(s, f))) continue;
+            if (!do_boxes_intersect(&f->box, &homes->boxes[n], compute_face_tolerance(s, f))) continue;
             if (mail->words) {
                 session_pack_coarse_face(f, mail->words + mail->total);
                 sent[mail->total / SESSION_FACE_WORDS] = i;
@@ -386,11 +387,11 @@ static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **se
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    write_faces(s, mail, NULL);
+    pack_or_count_faces(s, mail, NULL);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
     *sent = base_alloc((size_t)(mail->total / SESSION_FACE_WORDS + 1) * sizeof **sent);
     if (!mail->words || !*sent) return false;
-    write_faces(s, mail, *sent);
+    pack_or_count_faces(s, mail, *sent);
     return true;
 }
 
@@ -435,10 +436,10 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
 
 /* Adds the face to the candidate's list of hits if the candidate lies on the face and is not one of its corners.
  * Returns false if memory runs out. */
-static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
+static bool add_face_if_candidate_on_it(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
-    const double slack = find_face_slack(s, f);
+    const double slack = compute_face_tolerance(s, f);
     double weights[4];
     if (session_is_at_corner(f, c->position, slack) || !session_find_weights(f, c->position, slack, weights))
         return true;
@@ -447,25 +448,26 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 
 /* If the candidate is a corner of the face, and is known to lie on some other face, adds the face to the candidate's
  * list of faces with this corner. Returns false if memory runs out. */
-static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
+static bool add_face_if_candidate_is_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
-    if (c->hit_list < 0 || !session_is_at_corner(f, c->position, find_face_slack(s, f))) return true;
+    if (c->hit_list < 0 || !session_is_at_corner(f, c->position, compute_face_tolerance(s, f))) return true;
     return add_contact(s, number, NULL, &c->corner_list);
 }
 
-/* A test of a candidate on the face with the index `number`: test_face_hit() or test_face_corner(). Returns false if
- * memory runs out. */
+/* A test of a candidate on the face with the index `number`: add_face_if_candidate_on_it() or
+ * add_face_if_candidate_is_corner(). Returns false if memory runs out. */
 typedef bool try_function(hanging_search *s, int64_t number, candidate *c);
 
-static bool test_faces(hanging_search *s, try_function *try_one)
+static bool test_candidates_on_faces(hanging_search *s, try_function *try_one)
 {
     bool is_done = true;
     for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
         const session_coarse_face *f = &s->faces[number].face;
-        session_bin_walk walk = session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, find_face_slack(s, f));
+        session_bin_walk walk =
+            session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, compute_face_tolerance(s, f));
         int64_t near;
-        while (is_done && session_next_binned(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
+        while (is_done && session_next_point_in_bins(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
     }
     return is_done;
 }
@@ -484,7 +486,7 @@ static double find_largest_opposite_area(const hanging_search *s, const candidat
 
 /* Chooses, of the faces on which the candidate lies, the largest one on which it hangs according to session_hanging.h.
  * Sets c->face and c->weights if there is one. */
-static void choose_face(const hanging_search *s, candidate *c)
+static void choose_face_of_hanging_vertex(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {
         const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
@@ -496,11 +498,12 @@ static void choose_face(const hanging_search *s, candidate *c)
     }
 }
 
-static bool find_contacts(hanging_search *s)
+static bool find_faces_at_candidates(hanging_search *s)
 {
-    bool is_done = test_faces(s, test_face_hit);
-    if (s->contact_count) is_done = is_done && read_faces(s, true) && test_faces(s, test_face_corner);
-    for (int64_t i = 0; i < s->candidate_count && is_done; i++) choose_face(s, &s->candidates[i]);
+    bool is_done = test_candidates_on_faces(s, add_face_if_candidate_on_it);
+    if (s->contact_count)
+        is_done = is_done && read_faces(s, true) && test_candidates_on_faces(s, add_face_if_candidate_is_corner);
+    for (int64_t i = 0; i < s->candidate_count && is_done; i++) choose_face_of_hanging_vertex(s, &s->candidates[i]);
     return is_done;
 }
 
@@ -509,7 +512,7 @@ static bool find_contacts(hanging_search *s)
 /* Requests the values at the corners of received faces on which vertices hang: packs the message indices of these
  * faces, for the ranks that sent them. (*firsts)[i] receives, for each such face i, the index of its first corner's
  * value among all values that will be received; -1: no vertex hangs on face i. */
-static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
+static bool pack_face_requests(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
     requested->counts = base_calloc((size_t)s->team->ranks, sizeof *requested->counts);
@@ -528,7 +531,7 @@ static bool request_faces(const hanging_search *s, session_mail *requested, int6
     return true;
 }
 
-static bool store_vertices(const hanging_search *s, const int64_t *firsts, session_hanging *out)
+static bool store_hanging_vertices(const hanging_search *s, const int64_t *firsts, session_hanging *out)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < s->candidate_count; i++) count += s->candidates[i].face >= 0;
@@ -549,8 +552,8 @@ static bool store_vertices(const hanging_search *s, const int64_t *firsts, sessi
 /* Lists the groups of equal vertices whose values this rank will send to other ranks for their hanging vertices.
  * requests: for each rank, the requested faces, as indices within the message of faces that this rank sent to that
  * rank. mail: all of these messages. sent: the index in s->faces of each face in them. */
-static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
-                           const session_mail *requests, session_hanging *out)
+static bool store_requested_groups(const hanging_search *s, const session_mail *mail, const int64_t *sent,
+                                   const session_mail *requests, session_hanging *out)
 {
     out->sent_counts = base_calloc((size_t)s->team->ranks, sizeof *out->sent_counts);
     out->sent_groups = base_alloc((size_t)(4 * requests->total + 1) * sizeof *out->sent_groups);
@@ -581,12 +584,12 @@ static insitu_status find_hanging_vertices(hanging_search *s, session_hanging *o
         session_fail_for_memory(error, s->own_count * 96, "hanging vertices");
     insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &faces, &in, error);
     if (!status && !error->status) {
-        const bool is_done = receive_faces(s, &in) && find_contacts(s) && request_faces(s, &requested, &firsts) &&
-                             store_vertices(s, firsts, out);
+        const bool is_done = receive_faces(s, &in) && find_faces_at_candidates(s) &&
+                             pack_face_requests(s, &requested, &firsts) && store_hanging_vertices(s, firsts, out);
         if (!is_done) session_fail_for_memory(error, s->face_count * 150, "hanging vertices");
     }
     if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &requested, &requests, error);
-    if (!status && !error->status && !store_requests(s, &faces, sent, &requests, out))
+    if (!status && !error->status && !store_requested_groups(s, &faces, sent, &requests, out))
         session_fail_for_memory(error, requests.total * 32, "hanging vertices");
     session_mail_free(&faces);
     session_mail_free(&in);
@@ -614,7 +617,7 @@ insitu_status session_update_hanging_vertices(const session_hanging_basis *basis
     session_hanging found = {.positions_hash = mesh_group->positions_hash};
     if (mesh_group->hanging.positions_hash == mesh_group->positions_hash) return INSITU_OK;
     for (int i = 0; i < basis->part_count; i++)
-        search.rounding = fmax(search.rounding, session_position_rounding(basis->meshes[i]));
+        search.rounding = fmax(search.rounding, session_bound_position_rounding(basis->meshes[i]));
     if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
         session_fail_for_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
     insitu_status status = find_hanging_vertices(&search, &found, error);
@@ -637,7 +640,7 @@ insitu_status session_update_hanging_vertices(const session_hanging_basis *basis
 
 /* Sets the value of each hanging vertex to the value of the face at the vertex's position, interpolated from the values
  * at the face's corners. Returns whether a value changed. */
-static bool apply_constraints(const session_hanging *hanging, const double *received, double *means)
+static bool interpolate_at_hanging_vertices(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;
     for (int64_t i = 0; i < hanging->count; i++) {
@@ -654,8 +657,8 @@ static bool apply_constraints(const session_hanging *hanging, const double *rece
 
 /* Exchanges the values at corners of faces with other ranks. Then sets the value of each hanging vertex once, from the
  * values at its face's corners. *is_changed is set if a value changed on any rank. */
-static insitu_status exchange_and_constrain(const session_hanging *hanging, const session_team *team, double *means,
-                                            int *is_changed, base_error *error)
+static insitu_status exchange_and_interpolate_values(const session_hanging *hanging, const session_team *team,
+                                                     double *means, int *is_changed, base_error *error)
 {
     session_mail out = {.counts = hanging->sent_counts, .total = hanging->sent_total}, in = {0};
     insitu_status status = INSITU_OK;
@@ -669,7 +672,7 @@ static insitu_status exchange_and_constrain(const session_hanging *hanging, cons
         if (!status) status = session_agree(team->comm, error);
     }
     if (status) return status;
-    *is_changed = apply_constraints(hanging, (const double *)(const void *)in.words, means);
+    *is_changed = interpolate_at_hanging_vertices(hanging, (const double *)(const void *)in.words, means);
     session_mail_free(&in);
     return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, is_changed, 1, MPI_INT, MPI_MAX, team->comm),
                              "MPI_Allreduce");
@@ -681,6 +684,6 @@ insitu_status session_interpolate_hanging_vertices(const session_hanging *hangin
     insitu_status status = INSITU_OK;
     int is_changed = hanging->total > 0;
     for (int round = 0; round < MOST_ROUNDS && is_changed && !status; round++)
-        status = exchange_and_constrain(hanging, team, means, &is_changed, error);
+        status = exchange_and_interpolate_values(hanging, team, means, &is_changed, error);
     return status;
 }

@@ -33,7 +33,7 @@ typedef struct session_hanging_basis {
 
 /* Returns whether vertices of the mesh group are treated as equal if their positions differ only by rounding. They are
  * treated so in mesh groups of several meshes, and in meshes with levels of refinement. */
-bool session_has_twins(const session_mesh_group *mesh_group);
+bool session_merges_close_vertices(const session_mesh_group *mesh_group);
 
 /* Computes the mesh group's borders (the outer faces of its parts, session_border) and twins (vertices that coincide
  * except for rounding, session_twins.h), unless both are up to date. `parts` contains this rank's parts of the group's

@@ -14,7 +14,7 @@ static bool is_split(const session_mesh *part)
 
 /* Lists the parts whose cells are split into linear pieces, with new memory for their outer faces. Returns the number
  * of these parts. */
-static int list_parts(const session_parts *parts, session_face_part *out, base_error *error)
+static int list_split_parts(const session_parts *parts, session_face_part *out, base_error *error)
 {
     int count = 0;
     for (int i = 0; i < parts->count; i++) {
@@ -34,13 +34,13 @@ static insitu_status find_faces_of_split_parts(const session_parts *parts, const
     int count = 0;
     session_face_part *of = base_calloc((size_t)parts->count + 1, sizeof *of);
     if (!of) session_fail_for_memory(error, parts->count * (int64_t)sizeof *of, "outer faces of cells");
-    if (of) count = list_parts(parts, of, error);
+    if (of) count = list_split_parts(parts, of, error);
     insitu_status status = session_agree(team->comm, error);
     /* the coordinates of a corner have the same bits on all ranks that have it, so that the ranks' boxes need not be
      * extended */
     if (!status)
-        status =
-            session_homes_find(&homes, (const session_mesh *const *)parts->items, parts->count, false, 0, team, error);
+        status = session_compute_home_ranks(&homes, (const session_mesh *const *)parts->items, parts->count, false, 0,
+                                            team, error);
     if (!status) status = session_find_outer_faces(of, count, &homes, team, error);
     session_homes_free(&homes);
     base_free(of);

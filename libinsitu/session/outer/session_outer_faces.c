@@ -122,7 +122,7 @@ static inline bool is_first_occurrence(const part_cells *p, const session_face_l
 }
 
 /* Computes a face's key. Returns false if the face has fewer than three different vertices. */
-static bool make_key(const part_cells *p, const session_face_loop *loop, session_key *key)
+static bool make_face_key(const part_cells *p, const session_face_loop *loop, session_key *key)
 {
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
@@ -140,7 +140,7 @@ static bool make_key(const part_cells *p, const session_face_loop *loop, session
 
 /* ---- possible outer faces of this rank --------------------------------------------------------------------------- */
 
-static bool has_faces(const part_cells *p, int64_t cell)
+static bool is_cell_searched(const part_cells *p, int64_t cell)
 {
     if (grid_is_ghost(p->grid, cell)) return false;
     return !p->is_hidden || !p->is_hidden[p->first_pieces ? p->first_pieces[cell] : cell];
@@ -178,7 +178,7 @@ typedef struct xor_table {
     bool is_shared;         /* set if other threads add to the table at the same time */
 } xor_table;
 
-static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
+static inline void xor_into_sum(uint64_t *sum, uint64_t hash, bool is_shared)
 {
     if (!is_shared) {
         *sum ^= hash;
@@ -189,7 +189,7 @@ static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
 }
 
 /* Adds the face's hash, by exclusive or, to the sums of its vertices. */
-static void add_face(const xor_table *x, const session_face_loop *loop)
+static void xor_hash_of_face(const xor_table *x, const session_face_loop *loop)
 {
     const part_cells *p = x->part;
     uint64_t sum = 0;
@@ -202,13 +202,14 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
     if (vertices < 3) return;
     for (int64_t i = 0; i < loop->size; i++)
         if (is_first_occurrence(p, loop, i))
-            add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
+            xor_into_sum(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
 }
 
-/* Adds the hashes of the faces of a cell whose type has a table of faces, as add_faces() does. If two vertices of the
- * cell have the same hash, its faces have fewer vertices than in the table; then nothing is added and false is
- * returned. */
-static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
+/* Adds the hashes of the faces of a cell whose type has a table of faces, as xor_hashes_of_cell_faces() does. If two
+ * vertices of the cell have the same hash, its faces have fewer vertices than in the table; then nothing is added and
+ * false is returned. */
+static inline bool xor_hashes_of_table_faces(const xor_table *x, const session_face_table *table,
+                                             const int64_t *vertices, int count)
 {
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
     bool has_twins = false;
@@ -225,39 +226,40 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
         for (int i = 0; i < 3; i++) sums[(int)corners[i]] ^= hash;
         if (is_quad) sums[(int)corners[3]] ^= hash;
     }
-    for (int i = 0; i < count; i++) add_xor(&x->vertex_sums[vertices[i]], sums[i], x->is_shared);
+    for (int i = 0; i < count; i++) xor_into_sum(&x->vertex_sums[vertices[i]], sums[i], x->is_shared);
     return true;
 }
 
 /* Adds, by exclusive or, the hash of each of the cell's faces to the sums of the face's vertices. */
-static void add_faces(const xor_table *x, int64_t cell)
+static void xor_hashes_of_cell_faces(const xor_table *x, int64_t cell)
 {
     const grid *g = x->part->grid;
     const int type = grid_cell_type(g, cell);
     const session_face_table *table = session_faces_of_type(type);
-    if (!has_faces(x->part, cell)) return;
+    if (!is_cell_searched(x->part, cell)) return;
     if (table->count) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         const int count = grid_cell_vertices(g, cell, vertices);
         /* the arguments for tets are constants, so that the compiler unrolls all loops of the function */
         const bool is_tet = type == GRID_TET;
-        if (is_tet ? add_cell(x, session_faces_of_type(GRID_TET), vertices, 4) : add_cell(x, table, vertices, count))
+        if (is_tet ? xor_hashes_of_table_faces(x, session_faces_of_type(GRID_TET), vertices, 4)
+                   : xor_hashes_of_table_faces(x, table, vertices, count))
             return;
     }
     const session_cell_faces faces = session_faces_of_cell(g, cell);
     for (int64_t f = 0; f < faces.count; f++) {
         const session_face_loop loop = session_find_face_loop(&faces, f);
-        add_face(x, &loop);
+        xor_hash_of_face(x, &loop);
     }
 }
 
 /* Adds the sums of a vertex, in all tables, to the element of hash_sums that belongs to the vertex's hash. vertex:
  * index of the vertex, where the vertices of all parts are counted one after the other. */
-static void add_vertex(const face_search *s, int64_t vertex)
+static void combine_sums_of_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
     for (int i = 0; i < s->table_count; i++) sum ^= s->vertex_sums[i * s->vertex_count + vertex];
-    add_xor(&s->hash_sums[s->hashes[vertex] & s->mask], sum, s->threads > 1);
+    xor_into_sum(&s->hash_sums[s->hashes[vertex] & s->mask], sum, s->threads > 1);
 }
 
 /* Computes the sums of the hashes of each vertex's faces, and marks the vertices whose sum is not 0. */
@@ -271,11 +273,11 @@ static void mark_possible_outer_vertices(const face_search *s)
             const part_cells *p = &s->cells[part];
             const xor_table x = {p, table + p->first_vertex, omp_get_num_threads() > s->table_count};
 #pragma omp for schedule(static) nowait
-            for (int64_t cell = 0; cell < p->grid->cell_count; cell++) add_faces(&x, cell);
+            for (int64_t cell = 0; cell < p->grid->cell_count; cell++) xor_hashes_of_cell_faces(&x, cell);
         }
 #pragma omp barrier
 #pragma omp for schedule(static)
-        for (int64_t v = 0; v < s->vertex_count; v++) add_vertex(s, v);
+        for (int64_t v = 0; v < s->vertex_count; v++) combine_sums_of_vertex(s, v);
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < s->vertex_count; v++) s->may_be_outer[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
         region_leave();
@@ -334,12 +336,12 @@ static bool may_have_outer_face(const part_cells *p, int64_t cell)
 static void append_possible_outer_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
-    if (!has_faces(p, cell) || !may_have_outer_face(p, cell)) return;
+    if (!is_cell_searched(p, cell) || !may_have_outer_face(p, cell)) return;
     const session_cell_faces of_cell = session_faces_of_cell(p->grid, cell);
     for (int64_t f = 0; f < of_cell.count; f++) {
         const session_face_loop loop = session_find_face_loop(&of_cell, f);
         session_key key;
-        if (!(of_cell.size || may_be_outer_face(p, &loop)) || !make_key(p, &loop, &key)) continue;
+        if (!(of_cell.size || may_be_outer_face(p, &loop)) || !make_face_key(p, &loop, &key)) continue;
         if (!face_list_reserve(out)) return;
         out->faces[out->count] = (found_face){{cell, f}, part};
         out->keys[out->count++] = key;
@@ -432,7 +434,7 @@ static void keep_single_faces(face_search *s)
 
 /* Allocates the arrays of the search that have one entry per vertex, and assigns each part its section of them. Returns
  * false if memory runs out. */
-static bool make_tables(face_search *s)
+static bool allocate_search_arrays(face_search *s)
 {
     uint64_t slots = 1;
     while (slots < (uint64_t)s->vertex_count) slots *= 2;
@@ -453,7 +455,7 @@ static bool make_tables(face_search *s)
 
 /* If the mesh's cells are split into pieces, makes the search of part *p read the corner cells (linear cells with the
  * same corners) instead of the pieces. Otherwise does nothing. Returns false if memory runs out. */
-static bool read_corners(const session_mesh *mesh, part_cells *p)
+static bool create_corner_cells_of_part(const session_mesh *mesh, part_cells *p)
 {
     if (!mesh->topology.is_split) return true;
     p->grid = &p->corners.cells;
@@ -471,7 +473,7 @@ static bool number_parts(face_search *s)
         const session_face_part *of = &s->parts[part];
         part_cells *p = &s->cells[part];
         *p = (part_cells){.grid = &of->mesh->cells, .first_cell = s->cell_count, .first_vertex = s->vertex_count};
-        if (!read_corners(of->mesh, p)) return false;
+        if (!create_corner_cells_of_part(of->mesh, p)) return false;
         s->cell_count += p->grid->cell_count;
         s->vertex_count += count_part_vertices(p);
         if (!of->outer || !of->outer->threshold.is_given) continue;
@@ -485,7 +487,7 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
 {
     bool is_done = number_parts(s);
     if (is_done && s->cell_count == 0) return INSITU_OK;
-    is_done = is_done && make_tables(s);
+    is_done = is_done && allocate_search_arrays(s);
     if (is_done) {
         hash_vertices(s, by_id);
         mark_possible_outer_vertices(s);
@@ -505,7 +507,7 @@ enum { KEY_WORDS = 3 };
 /* Returns the home rank of a face, which counts how often the face occurs on all ranks; -1 if only this rank can have
  * it, because some vertex of the face lies in no other rank's box. The home rank is that of the vertex with the least
  * hash, which is the same vertex on all ranks. */
-static int find_face_home(const face_search *s, const session_homes *homes, int64_t number)
+static int find_home_rank_of_face(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
     const part_cells *p = &s->cells[face->part];
@@ -515,14 +517,14 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
     double point[1][3];
     for (int64_t i = 0; i < loop.size; i++) {
         const int64_t vertex = session_face_vertex(&loop, i);
-        grid_vertex(p->grid, vertex, point[0]);
+        grid_read_vertex_position(p->grid, vertex, point[0]);
         if (!session_is_in_other_box(homes, point[0])) return -1;
         if (p->hashes[vertex] < p->hashes[first]) first = vertex;
     }
-    grid_vertex(p->grid, first, point[0]);
+    grid_read_vertex_position(p->grid, first, point[0]);
     const session_key key = find_vertex_key(s, face->part, first, homes->by_id);
-    return session_find_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]),
-                             (int64_t)key.words[0]);
+    return session_find_home_rank(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]),
+                                  (int64_t)key.words[0]);
 }
 
 /* Packs the keys of the faces that other ranks may have too, sorted by the faces' home ranks. *order receives the face
@@ -534,7 +536,7 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
     bool is_done = next && home && mail->counts;
     for (int64_t i = 0; i < s->count && is_done; i++) {
-        home[i] = find_face_home(s, homes, i);
+        home[i] = find_home_rank_of_face(s, homes, i);
         if (home[i] >= 0) next[home[i] + 1]++;
     }
     for (int rank = 0; rank < ranks && is_done; rank++) {
@@ -642,7 +644,8 @@ static bool is_on_found_face(const face_walk *walk, const session_face_loop *loo
 {
     int64_t vertices[4];
     for (int64_t i = 0; i < loop->size; i++) vertices[i] = session_face_vertex(loop, i);
-    return session_find_faces(&walk->part->rims, walk->of.cell, vertices, loop->size) >> walk->of.face & 1;
+    return session_find_faces_with_vertices(&walk->part->rims, walk->of.cell, vertices, loop->size) >> walk->of.face &
+           1;
 }
 
 /* Stores the next face. Returns false if there are no more. */
@@ -706,13 +709,13 @@ static bool append_faces(const face_search *s, const found_face *found, int64_t 
 static void store_part_faces(const face_search *s, int64_t first, int64_t end, session_outer *outer, base_error *error)
 {
     int64_t capacity = end - first + 1;
-    session_drop_outer(outer, true);
+    session_drop_outer_surface(outer, true);
     outer->faces = base_alloc((size_t)capacity * sizeof *outer->faces);
     bool is_made = outer->faces;
     for (int64_t i = first; i < end && is_made; i++) is_made = append_faces(s, &s->faces[i], &capacity, outer);
     outer->are_faces_known = is_made;
     if (is_made) return;
-    session_drop_outer(outer, true);
+    session_drop_outer_surface(outer, true);
     session_fail_for_memory(error, capacity * (int64_t)sizeof *outer->faces, "outer faces");
 }
 

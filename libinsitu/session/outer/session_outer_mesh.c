@@ -102,7 +102,7 @@ static void find_point_inside_cell(const grid *g, int64_t cell, double out[3])
     int64_t vertex, count = 0;
     double sum[3] = {0, 0, 0}, position[3];
     while (grid_walk_next(&walk, &vertex)) {
-        grid_vertex(g, vertex, position);
+        grid_read_vertex_position(g, vertex, position);
         for (int axis = 0; axis < 3; axis++) sum[axis] += position[axis];
         count++;
     }
@@ -127,7 +127,7 @@ typedef struct outer_work {
     const grid *cells;
     session_outer *out;
     /* for each vertex of the whole mesh, its index in the outer mesh; -1: the outer mesh does not have it, or the
-     * current face must not use it (separate_vertices()) */
+     * current face must not use it (clear_vertex_map_for_new_face()) */
     int64_t *vertex_map;
     float *heights; /* value of the scalar at each vertex of the outer mesh: 0 on a face, -1 at an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
@@ -178,7 +178,7 @@ static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double pos
 /* Used if there are normals, which differ between faces at a common vertex. Removes all vertices from vertex_map, so
  * that the current face gets vertices of its own, unless it lies on the same curved face of a cell as the previous
  * face. */
-static void separate_vertices(outer_work *w)
+static void clear_vertex_map_for_new_face(outer_work *w)
 {
     if (w->is_curved && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
     for (int64_t v = w->first_mapped; v < w->vertex_count; v++) w->vertex_map[w->out->vertex_origins[v]] = -1;
@@ -220,7 +220,7 @@ static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
 /* Adds a tet on a triangle, or a pyramid on a quad. The apex must have been added before. */
 static void add_cell_between_face_and_apex(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
-    if (w->normals) separate_vertices(w);
+    if (w->normals) clear_vertex_map_for_new_face(w);
     w->out->offsets[w->cell_count] = w->entry_count;
     w->out->types[w->cell_count] = loop->count == 3 ? GRID_TET : GRID_PYRAMID;
     w->pyramid_count += loop->count == 4;
@@ -232,7 +232,7 @@ static void add_cell_between_face_and_apex(outer_work *w, const corner_loop *loo
 }
 
 /* Adds a tet on a triangle, or a pyramid on a quad, together with its apex. Does nothing if the face's area is 0. */
-static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
+static void add_cell_on_face(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
 {
     double apex[3];
     if (loop->count < 3) return;
@@ -323,16 +323,16 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 
 /* Appends the nodes along the edges of a face of the caller's cell (the face's rim) to out->loops, so that edges are
  * drawn along them. Returns the index of the new loop in out->loops. */
-static int64_t add_rim(outer_work *w, int64_t cell, int face)
+static int64_t add_rim_loop(outer_work *w, int64_t cell, int face)
 {
-    const session_rim_kind *of = session_rims_of(&w->rims, cell);
+    const session_rim_kind *of = session_get_rims_of_cell(&w->rims, cell);
     const int64_t loop = w->loop_end;
     w->out->loops[w->loop_end++] = of->counts[face];
     w->out->loops[w->loop_end++] = w->rims.rows.kinds[session_find_kind_of_cell(&w->rims.rows, cell)].nodes.order;
     for (int i = 0; i < of->counts[face]; i++) {
-        const int64_t vertex = session_find_row_vertex(&w->rims.rows, cell, of->nodes[face][i]);
+        const int64_t vertex = session_find_vertex_of_node(&w->rims.rows, cell, of->nodes[face][i]);
         double position[3];
-        grid_vertex(w->cells, vertex, position);
+        grid_read_vertex_position(w->cells, vertex, position);
         w->out->loops[w->loop_end++] = add_copied_vertex(w, vertex, position);
     }
     return loop;
@@ -351,10 +351,10 @@ static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p
 
 /* Sets the loop of the cells from index `first` on, which were built on a piece's face, to the rim of the face that
  * find_parent_face() has found: the nodes along that face's edges. Does nothing for a face inside its cell. */
-static void set_rim(outer_work *w, int64_t first)
+static void assign_rim_loop_to_cells(outer_work *w, int64_t first)
 {
     if (w->face < 0) return;
-    if (!w->rim_loops[w->face]) w->rim_loops[w->face] = add_rim(w, w->parent, w->face);
+    if (!w->rim_loops[w->face]) w->rim_loops[w->face] = add_rim_loop(w, w->parent, w->face);
     for (int64_t i = first; i < w->cell_count; i++) w->out->loops[i] = w->rim_loops[w->face];
 }
 
@@ -387,14 +387,14 @@ static void read_polygon(const grid *g, const session_face_loop *face, face_poly
     p->count = 0;
     for (int64_t i = 0; i < face->size; i++) {
         p->vertices[p->count] = session_face_vertex(face, i);
-        grid_vertex(g, p->vertices[p->count], p->positions[p->count]);
+        grid_read_vertex_position(g, p->vertices[p->count], p->positions[p->count]);
         if (p->count && vector3_compare(p->positions[p->count], p->positions[p->count - 1]) == 0) continue;
         p->count++;
     }
     while (p->count > 1 && vector3_compare(p->positions[p->count - 1], p->positions[0]) == 0) p->count--;
 }
 
-static void add_face(outer_work *w, const session_face *face)
+static void add_cells_on_outer_face(outer_work *w, const session_face *face)
 {
     const session_cell_faces faces = session_faces_of_cell(w->cells, face->cell);
     const session_face_loop of = session_find_face_loop(&faces, face->face);
@@ -409,9 +409,9 @@ static void add_face(outer_work *w, const session_face *face)
     } else {
         corner_loop loop = {0};
         for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->positions[i]);
-        add_cell(w, &loop, inside, face->cell);
+        add_cell_on_face(w, &loop, inside, face->cell);
     }
-    if (w->has_rims) set_rim(w, first);
+    if (w->has_rims) assign_rim_loop_to_cells(w, first);
 }
 
 /* Upper bounds of the sizes of the arrays that a part's outer faces need in the outer mesh. */
@@ -424,7 +424,7 @@ typedef struct outer_counts {
 /* Computes upper bounds of the sizes of arrays for the outer mesh of a part (outer_counts). entry_count also bounds the
  * number of vertices. If there are normals, the triangles of a polygon have no common vertices, and the polygon's loop
  * needs further vertices. */
-static outer_counts find_count_bounds(const grid *g, const session_outer *outer, bool has_normals)
+static outer_counts find_array_size_bounds(const grid *g, const session_outer *outer, bool has_normals)
 {
     outer_counts most = {0};
     for (int64_t i = 0; i < outer->face_count; i++) {
@@ -433,7 +433,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
         const session_face_loop loop = session_find_face_loop(&faces, face->face);
         const int64_t size = loop.size;
         double positions[4][3];
-        for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), positions[k]);
+        for (int k = 0; k < 4 && k < size; k++)
+            grid_read_vertex_position(g, session_face_vertex(&loop, k), positions[k]);
         const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])positions, (int)size);
         most.cell_count += is_polygon ? size - 2 : 1;
         most.loop_entry_count += is_polygon ? size + 2 : 0;
@@ -446,7 +447,7 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
 /* Adds to the upper bounds in *most the space for the rims (nodes along the edges of faces) of the caller's cells that
  * have outer faces. A rim is stored as a loop. It may also need further vertices, because some of its nodes may lie on
  * no outer face. */
-static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
+static void add_rim_sizes(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;
     for (int64_t i = 0; i < outer->face_count; i++) {
@@ -485,7 +486,7 @@ static void work_free(outer_work *w)
 static bool work_create(const session_mesh *whole, bool has_normals, session_outer *out, outer_work *w)
 {
     const grid *g = &whole->cells;
-    outer_counts most = find_count_bounds(g, out, has_normals);
+    outer_counts most = find_array_size_bounds(g, out, has_normals);
     *w = (outer_work){.cells = g,
                       .out = out,
                       .has_rims = whole->topology.is_split,
@@ -495,7 +496,7 @@ static bool work_create(const session_mesh *whole, bool has_normals, session_out
                       .mapped_face = -1};
     if (w->has_rims && !session_rims_create(whole, &w->rims)) return false;
     if (w->has_rims && has_normals && !session_face_normals_create(whole, &w->curved)) return false;
-    if (w->has_rims) add_rim_bounds(w, out, &most);
+    if (w->has_rims) add_rim_sizes(w, out, &most);
     const int64_t cells = most.cell_count, entries = most.entry_count, loops = most.loop_entry_count;
     if (most.largest_corner_count > INT32_MAX / 64) return false;
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
@@ -543,7 +544,7 @@ static grid describe_grid(const outer_work *w)
 
 /* Stores the normals as the gradients of the outer mesh's scalar, from which the renderer computes normals. Returns
  * false if memory runs out, or if there are too many vertices for 32-bit indices of gradients. */
-static bool finish_normals(outer_work *w, session_scalar *scalar)
+static bool store_normals_as_gradients(outer_work *w, session_scalar *scalar)
 {
     if (!w->normals) return true;
     if (w->vertex_count > INT32_MAX) return false;
@@ -572,7 +573,7 @@ static bool finish_mesh(const session_mesh *whole, outer_work *w)
     scalar->are_values_stale = scalar->may_have_changed = false;
     scalar->distances = w->heights;
     w->heights = NULL;
-    return finish_normals(w, scalar);
+    return store_normals_as_gradients(w, scalar);
 }
 
 insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, bool has_normals,
@@ -580,17 +581,17 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
 {
     outer_work work;
     if (outer->mesh && (outer->mesh->scalars[0].gradients != NULL) == has_normals) return INSITU_OK;
-    session_drop_outer(outer, false);
+    session_drop_outer_surface(outer, false);
     bool is_made = work_create(whole, has_normals, outer, &work);
     if (is_made) {
         for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.vertex_map[v] = -1;
-        for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);
+        for (int64_t i = 0; i < outer->face_count; i++) add_cells_on_outer_face(&work, &outer->faces[i]);
         outer->offsets[work.cell_count] = work.entry_count;
         is_made = finish_mesh(whole, &work);
     }
     work_free(&work);
     if (is_made) return INSITU_OK;
-    session_drop_outer(outer, false);
+    session_drop_outer_surface(outer, false);
     return session_fail_for_memory(error, outer->face_count * 250, "the mesh of outer faces");
 }
 

@@ -49,14 +49,14 @@ static insitu_status fail_at_face(const patch_faces *p, int patch, int64_t face,
     const insitu_patch *given = &p->field->given.patches[patch];
     const grid_array faces = session_grid_array(&given->faces);
     const long long number = given->connectivity.data ? face + p->mesh->given.index_base
-                             : given->faces.data      ? grid_array_index(&faces, face)
+                             : given->faces.data      ? grid_read_index(&faces, face)
                                                       : given->first_face + face;
     return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": patch %d: %sface %lld %s", p->mesh->label,
                      p->field->given.name, patch, given->connectivity.data ? "its " : "", number, what);
 }
 
-static insitu_status fail_range_at_face(const patch_faces *p, int patch, int64_t face, const char *what, int64_t count,
-                                        base_error *error)
+static insitu_status fail_for_index_range_at_face(const patch_faces *p, int patch, int64_t face, const char *what,
+                                                  int64_t count, base_error *error)
 {
     char words[128];
     const long long base = p->mesh->given.index_base;
@@ -79,8 +79,8 @@ static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *pa
         return;
     }
     const grid_array offsets = session_index_array(mesh, &patch->offsets);
-    row->first = grid_array_index(&offsets, i);
-    row->size = grid_array_index(&offsets, i + 1) - row->first;
+    row->first = grid_read_index(&offsets, i);
+    row->size = grid_read_index(&offsets, i + 1) - row->first;
 }
 
 static insitu_status read_patch_face(const patch_faces *p, int patch, int64_t i, patch_face *out, base_error *error)
@@ -93,10 +93,10 @@ static insitu_status read_patch_face(const patch_faces *p, int patch, int64_t i,
     } else {
         const grid_array faces = session_index_array(mesh, &given->faces);
         const int64_t number =
-            given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
+            given->faces.data ? grid_read_index(&faces, i) : given->first_face - mesh->index_base + i;
         if (number < 0 || number >= session_face_count(mesh))
-            return fail_range_at_face(p, patch, i, "is outside", session_face_count(mesh), error);
-        *out = (patch_face){session_locate_caller_face(mesh, number), number};
+            return fail_for_index_range_at_face(p, patch, i, "is outside", session_face_count(mesh), error);
+        *out = (patch_face){session_find_vertices_of_caller_face(mesh, number), number};
     }
     if (row->size < 3) return fail_at_face(p, patch, i, "has fewer than three vertices", error);
     if (row->first < 0 || row->first > row->limit || row->size > row->limit - row->first)
@@ -104,14 +104,14 @@ static insitu_status read_patch_face(const patch_faces *p, int patch, int64_t i,
     return INSITU_OK;
 }
 
-static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const patch_face *face, int64_t *groups,
-                               base_error *error)
+static insitu_status read_vertex_groups_of_face(const patch_faces *p, int patch, int64_t i, const patch_face *face,
+                                                int64_t *groups, base_error *error)
 {
     const int64_t count = p->mesh->given.vertex_count;
     for (int64_t k = 0; k < face->row.size; k++) {
-        const int64_t vertex = grid_array_index(&face->row.list, face->row.first + k);
+        const int64_t vertex = grid_read_index(&face->row.list, face->row.first + k);
         if (vertex < 0 || vertex >= count)
-            return fail_range_at_face(p, patch, i, "has a vertex index outside", count, error);
+            return fail_for_index_range_at_face(p, patch, i, "has a vertex index outside", count, error);
         groups[k] = p->mesh->discontinuous.is_active ? -1 : p->numbers->group_of_vertex[vertex];
         if (groups[k] >= 0) continue;
         const session_key key = session_caller_vertex_key(p->mesh, vertex, p->numbers->by_id);
@@ -140,7 +140,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             patch_face face;
             if (read_patch_face(p, patch, i, &face, error) ||
-                read_face(p, patch, i, &face, p->groups + p->first_groups[f], error))
+                read_vertex_groups_of_face(p, patch, i, &face, p->groups + p->first_groups[f], error))
                 return error->status;
         }
     return INSITU_OK;
@@ -151,10 +151,10 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
 /* Checks that a face is on the boundary and is given only once, and sets p->is_drawn[f]. i: index of the face in the
  * patch; f: its index among the faces of all patches. is_taken: one bit per face of the mesh, set for the faces that
  * have been checked before. */
-static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
-                                 base_error *error)
+static insitu_status check_face_by_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
+                                         base_error *error)
 {
-    const session_face_sides sides = session_find_face_sides(&p->mesh->given);
+    const session_face_sides sides = session_get_owner_arrays(&p->mesh->given);
     patch_face face;
     int64_t cells[2];
     if (read_patch_face(p, patch, i, &face, error)) return error->status;
@@ -175,7 +175,7 @@ static bool are_all_faces_numbered(const insitu_field *field)
     return all;
 }
 
-static insitu_status check_owners(patch_faces *p, base_error *error)
+static insitu_status check_faces_by_owner(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
     const int64_t bytes = session_face_count(&p->mesh->given) / 8 + 1;
@@ -184,7 +184,7 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
     if (!is_taken) return fail_for_memory(bytes / 8, error);
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count && !error->status; i++)
-            check_owner(p, patch, i, f++, is_taken, error);
+            check_face_by_owner(p, patch, i, f++, is_taken, error);
     base_free(is_taken);
     return error->status;
 }
@@ -224,7 +224,7 @@ static bool search_create(cell_search *s, const patch_faces *p)
            session_keys_create(&s->keys, p->count);
 }
 
-static void add_vertex(session_key *key, int64_t group)
+static void add_group_to_key(session_key *key, int64_t group)
 {
     const uint64_t h = session_key_hash(&(session_key){{(uint64_t)group + 1, 0, 0}});
     key->words[0] += h;
@@ -239,7 +239,7 @@ static void add_faces_to_table(cell_search *s, const patch_faces *p)
         bool is_whole = true;
         for (int64_t k = p->first_groups[f]; k < p->first_groups[f + 1]; k++) {
             is_whole = is_whole && p->groups[k] >= 0;
-            add_vertex(&key, p->groups[k]);
+            add_group_to_key(&key, p->groups[k]);
         }
         s->key_of_face[f] = is_whole ? session_keys_add(&s->keys, &key) : -1;
         for (int64_t k = p->first_groups[f]; k < p->first_groups[f + 1] && is_whole; k++) s->has_face[p->groups[k]] = 1;
@@ -254,13 +254,13 @@ static bool find_face_key(const cell_search *s, const patch_faces *p, const sess
     for (int64_t i = 0; i < loop->size; i++) {
         const int64_t group = p->numbers->group_of_vertex[session_face_vertex(loop, i)];
         if (group < 0 || !s->has_face[group]) return false;
-        add_vertex(key, group);
+        add_group_to_key(key, group);
     }
     return true;
 }
 
 /* Counts, for each key, the cells that have a face with this key, and records whether one of them is drawn. */
-static void count_cells(cell_search *s, const patch_faces *p)
+static void count_cells_of_keys(cell_search *s, const patch_faces *p)
 {
     const grid *g = &p->mesh->cells;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -301,7 +301,7 @@ static insitu_status check_faces_by_cells(patch_faces *p, base_error *error)
     insitu_status status = INSITU_OK;
     if (search_create(&search, p)) {
         add_faces_to_table(&search, p);
-        count_cells(&search, p);
+        count_cells_of_keys(&search, p);
         status = check_cell_counts(&search, p, error);
     } else {
         status = fail_for_memory(p->count * 6, error);
@@ -312,7 +312,7 @@ static insitu_status check_faces_by_cells(patch_faces *p, base_error *error)
 
 /* ---- values of the patches --------------------------------------------------------------------------------------- */
 
-static grid_field find_patch_field(const patch_faces *p, int patch, int component)
+static grid_field describe_patch_values(const patch_faces *p, int patch, int component)
 {
     const insitu_field *field = &p->field->given;
     const insitu_patch *given = &field->patches[patch];
@@ -325,14 +325,15 @@ static grid_field find_patch_field(const patch_faces *p, int patch, int componen
     return out;
 }
 
-static bool is_first_in_groups(const int64_t *groups, int64_t i)
+static bool is_first_of_equal_groups(const int64_t *groups, int64_t i)
 {
     for (int64_t k = 0; k < i; k++)
         if (groups[k] == groups[i]) return false;
     return groups[i] >= 0;
 }
 
-static insitu_status store_values(const patch_faces *p, int component, session_patch_values *out, base_error *error)
+static insitu_status store_patch_values(const patch_faces *p, int component, session_patch_values *out,
+                                        base_error *error)
 {
     const int64_t most = p->first_groups[p->count];
     int64_t f = 0;
@@ -340,12 +341,12 @@ static insitu_status store_values(const patch_faces *p, int component, session_p
     out->values = base_alloc((size_t)most * sizeof *out->values);
     if (!out->groups || !out->values) return fail_for_memory(most * 2, error);
     for (int patch = 0; patch < p->field->given.patch_count; patch++) {
-        const grid_field values = find_patch_field(p, patch, component);
+        const grid_field values = describe_patch_values(p, patch, component);
         for (int64_t i = 0; i < p->field->given.patches[patch].count; i++, f++) {
             const double value = grid_field_value(&values, i);
             const int64_t *groups = p->groups + p->first_groups[f], size = p->first_groups[f + 1] - p->first_groups[f];
             for (int64_t k = 0; k < size && p->is_drawn[f] && isfinite(value); k++) {
-                if (!is_first_in_groups(groups, k)) continue;
+                if (!is_first_of_equal_groups(groups, k)) continue;
                 out->groups[out->count] = groups[k];
                 out->values[out->count++] = value;
             }
@@ -372,9 +373,9 @@ insitu_status session_find_patch_values(const session_mesh *mesh, int field, int
     p.first_groups = base_alloc((size_t)(p.count + 1) * sizeof *p.first_groups);
     p.is_drawn = base_calloc((size_t)p.count, 1);
     insitu_status status = p.first_groups && p.is_drawn ? list_faces(&p, error) : fail_for_memory(p.count * 2, error);
-    const bool has_sides = session_has_owners(&mesh->given) && are_all_faces_numbered(given);
-    if (!status) status = has_sides ? check_owners(&p, error) : check_faces_by_cells(&p, error);
-    if (!status) status = store_values(&p, component, out, error);
+    const bool has_sides = session_has_face_owners(&mesh->given) && are_all_faces_numbered(given);
+    if (!status) status = has_sides ? check_faces_by_owner(&p, error) : check_faces_by_cells(&p, error);
+    if (!status) status = store_patch_values(&p, component, out, error);
     base_free(p.first_groups);
     base_free(p.groups);
     base_free(p.is_drawn);

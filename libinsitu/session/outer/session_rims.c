@@ -5,15 +5,15 @@
 
 /* ---- faces and rims of a type and order of cells ----------------------------------------------------------------- */
 
-void session_find_rim_plane(const session_nodes *of, int face, double out[3])
+void session_find_face_plane_normal(const session_nodes *of, int face, double out[3])
 {
     int plane[3];
     session_find_face_plane(session_get_cell_shape(of->type), face, plane);
     for (int axis = 0; axis < 3; axis++) out[axis] = plane[axis];
 }
 
-static void list_rim(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,
-                     int *nodes)
+static void list_rim_nodes(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,
+                           int *nodes)
 {
     const session_shape *shape = session_get_cell_shape(of->type);
     const int corners = face[3] < 0 ? 3 : 4;
@@ -23,7 +23,7 @@ static void list_rim(const session_nodes *of, insitu_vertex_order order, const s
         int at[3];
         for (int step = 0; step < of->order; step++) {
             for (int axis = 0; axis < 3; axis++) at[axis] = from[axis] * of->order + (to[axis] - from[axis]) * step;
-            nodes[(*count)++] = session_node_index(of, order, at[0], at[1], at[2]);
+            nodes[(*count)++] = session_find_node_in_connectivity(of, order, at[0], at[1], at[2]);
         }
     }
 }
@@ -33,12 +33,13 @@ static bool make_rim_kind(const session_nodes *of, insitu_vertex_order order, se
     const session_shape *shape = session_get_cell_shape(of->type);
     out->faces_of_node = base_calloc((size_t)of->count, 1);
     if (!out->faces_of_node) return false;
-    for (int f = 0; f < shape->face_count; f++) list_rim(of, order, shape->faces[f], &out->counts[f], out->nodes[f]);
+    for (int f = 0; f < shape->face_count; f++)
+        list_rim_nodes(of, order, shape->faces[f], &out->counts[f], out->nodes[f]);
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
             for (int i = 0; i <= of->order; i++) {
                 if (!session_has_node(of, i, j, k)) continue;
-                const int at = session_node_index(of, order, i, j, k);
+                const int at = session_find_node_in_connectivity(of, order, i, j, k);
                 if (at < of->count)
                     out->faces_of_node[at] =
                         (unsigned char)session_faces_of_node(shape, of->order, (const int[]){i, j, k});
@@ -51,7 +52,7 @@ static bool make_rim_kind(const session_nodes *of, insitu_vertex_order order, se
 bool session_rims_create(const session_mesh *mesh, session_rims *out)
 {
     *out = (session_rims){.rows = session_describe_rows(mesh), .cell = -1};
-    session_list_kinds(&out->rows);
+    session_list_cell_kinds(&out->rows);
     out->kinds = base_calloc((size_t)out->rows.kind_count, sizeof *out->kinds);
     out->faces_of_vertex = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);
     bool is_made = out->kinds && out->faces_of_vertex;
@@ -70,7 +71,7 @@ void session_rims_free(session_rims *rims)
 
 int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell)
 {
-    const session_rim_kind *kind = session_rims_of(rims, cell);
+    const session_rim_kind *kind = session_get_rims_of_cell(rims, cell);
     int64_t count = 0;
     for (int f = 0; f < RIMS_MOST_FACES; f++) count += kind->counts[f];
     return count;
@@ -83,12 +84,12 @@ static void set_faces_of_vertices(session_rims *rims, int64_t cell, bool are_set
 {
     const int kind = session_find_kind_of_cell(&rims->rows, cell);
     for (int n = 0; n < rims->rows.kinds[kind].nodes.count; n++) {
-        unsigned char *faces = &rims->faces_of_vertex[session_find_row_vertex(&rims->rows, cell, n)];
+        unsigned char *faces = &rims->faces_of_vertex[session_find_vertex_of_node(&rims->rows, cell, n)];
         *faces = are_set ? *faces | rims->kinds[kind].faces_of_node[n] : 0;
     }
 }
 
-unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
+unsigned session_find_faces_with_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
 {
     unsigned faces = (1U << RIMS_MOST_FACES) - 1;
     if (rims->cell != cell) {
@@ -102,6 +103,6 @@ unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *ver
 
 int session_find_face_of_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
 {
-    const unsigned faces = session_find_faces(rims, cell, vertices, count);
+    const unsigned faces = session_find_faces_with_vertices(rims, cell, vertices, count);
     return faces ? __builtin_ctz(faces) : -1;
 }

@@ -35,7 +35,7 @@ void session_rims_free(session_rims *rims);
 int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell);
 
 /* Returns a bit mask of those faces of the caller's cell that contain all of the given vertices. */
-unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
+unsigned session_find_faces_with_vertices(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 
 /* Returns the index of the first face of the caller's cell that contains all of the given vertices, or -1 if there is
  * none. */
@@ -43,10 +43,10 @@ int session_find_face_of_vertices(session_rims *rims, int64_t cell, const int64_
 
 /* Computes the normal, of any length, of the plane in which a face of the reference cell lies. The normal is (0, 0, z)
  * if the cell is a triangle or quad. */
-void session_find_rim_plane(const session_nodes *of, int face, double out[3]);
+void session_find_face_plane_normal(const session_nodes *of, int face, double out[3]);
 
 /* Returns the faces and rims of cells with the type and order of the given cell of the caller. */
-static inline const session_rim_kind *session_rims_of(const session_rims *rims, int64_t cell)
+static inline const session_rim_kind *session_get_rims_of_cell(const session_rims *rims, int64_t cell)
 {
     return &rims->kinds[session_find_kind_of_cell(&rims->rows, cell)];
 }

@@ -22,7 +22,7 @@ static bool is_same_threshold(const session_threshold *a, const session_threshol
     return a->field == b->field && a->component == b->component && a->low == b->low && a->high == b->high;
 }
 
-session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold)
+session_outer *session_find_outer_surface(const session_mesh *mesh, const scene_threshold *threshold)
 {
     const session_threshold resolved = resolve_threshold(mesh, threshold);
     for (int i = 0; i < mesh->outer_count; i++)
@@ -30,7 +30,7 @@ session_outer *session_find_outer(const session_mesh *mesh, const scene_threshol
     return NULL;
 }
 
-static session_outer *add_outer(session_mesh *mesh, const scene_threshold *threshold)
+static session_outer *add_outer_surface(session_mesh *mesh, const scene_threshold *threshold)
 {
     session_outer **outers = base_realloc(mesh->outers, (size_t)(mesh->outer_count + 1) * sizeof *outers);
     if (!outers) return NULL;
@@ -42,23 +42,23 @@ static session_outer *add_outer(session_mesh *mesh, const scene_threshold *thres
     return out;
 }
 
-bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold)
+bool session_mark_outer_surface_needed(session_mesh *mesh, const scene_threshold *threshold)
 {
     session_scalar *scalar;
-    session_outer *outer = session_find_outer(mesh, threshold);
-    if (!outer) outer = add_outer(mesh, threshold);
+    session_outer *outer = session_find_outer_surface(mesh, threshold);
+    if (!outer) outer = add_outer_surface(mesh, threshold);
     if (!outer) return false;
     outer->is_needed = true;
     return !threshold->is_given || session_mark_scalar(mesh, &threshold->field, false, &scalar);
 }
 
-void session_drop_thresholds(session_mesh *mesh)
+void session_drop_unused_outer_surfaces(session_mesh *mesh)
 {
     int kept = 0;
     for (int i = 0; i < mesh->outer_count; i++) {
         session_outer *outer = mesh->outers[i];
         if (outer->threshold.is_given && !outer->is_needed) {
-            session_drop_outer(outer, true);
+            session_drop_outer_surface(outer, true);
             base_free(outer);
         } else {
             mesh->outers[kept++] = outer;
@@ -69,7 +69,7 @@ void session_drop_thresholds(session_mesh *mesh)
 
 /* Returns the scalar (field component) whose values the threshold compares with its bounds. Returns NULL if there is no
  * threshold, or if the mesh does not have the field. */
-static const session_scalar *find_scalar(const session_mesh *mesh, const session_threshold *threshold)
+static const session_scalar *find_threshold_scalar(const session_mesh *mesh, const session_threshold *threshold)
 {
     for (int i = 0; i < mesh->scalar_count && threshold->is_given && threshold->field >= 0; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
@@ -79,15 +79,15 @@ static const session_scalar *find_scalar(const session_mesh *mesh, const session
     return NULL;
 }
 
-bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer)
+bool session_are_outer_faces_stale(const session_mesh *mesh, const session_outer *outer)
 {
-    const session_scalar *scalar = find_scalar(mesh, &outer->threshold);
+    const session_scalar *scalar = find_threshold_scalar(mesh, &outer->threshold);
     return !outer->are_faces_known || (scalar && scalar->version != outer->version);
 }
 
-void session_mark_outer_fresh(const session_mesh *mesh, session_outer *outer)
+void session_mark_outer_faces_current(const session_mesh *mesh, session_outer *outer)
 {
-    const session_scalar *scalar = find_scalar(mesh, &outer->threshold);
+    const session_scalar *scalar = find_threshold_scalar(mesh, &outer->threshold);
     outer->version = scalar ? scalar->version : 0;
 }
 
@@ -106,7 +106,7 @@ static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
 unsigned char *session_find_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads)
 {
     const int64_t count = mesh->cells.cell_count;
-    const session_scalar *scalar = find_scalar(mesh, threshold);
+    const session_scalar *scalar = find_threshold_scalar(mesh, threshold);
     unsigned char *is_hidden = base_alloc((size_t)(count ? count : 1));
     if (!is_hidden) return NULL;
     const grid_field field = scalar ? session_get_scalar_values(mesh, scalar) : (grid_field){0};

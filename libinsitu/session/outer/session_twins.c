@@ -48,8 +48,8 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
     for (int64_t i = 0; i < loop.size; i++) {
         const int64_t from = session_face_vertex(&loop, i), to = session_face_vertex(&loop, (i + 1) % loop.size);
         double a[3], b[3];
-        grid_vertex(g, from, a);
-        grid_vertex(g, to, b);
+        grid_read_vertex_position(g, from, a);
+        grid_read_vertex_position(g, to, b);
         const double length = session_point_distance(a, b);
         if (!(length > 0)) continue;
         edges[from] = fmin(edges[from], length);
@@ -69,7 +69,7 @@ static bool add_corners(twin_search *s, const session_mesh *mesh, const session_
         const double edge = edges[border->vertices[i]];
         if (isinf(edge)) continue;
         face_corner *c = &s->corners[s->corner_count++];
-        grid_vertex(g, border->vertices[i], c->position);
+        grid_read_vertex_position(g, border->vertices[i], c->position);
         c->slack = fmin(fmax(1e-5 * edge, s->rounding), edge / 4);
     }
     base_free(edges);
@@ -87,7 +87,7 @@ static bool list_own_corners(twin_search *s)
     for (int m = 0; m < s->parts->count; m++) {
         for (int64_t i = 0; i < borders[m].vertex_count; i++) {
             border_vertex *v = &s->vertices[s->vertex_count++];
-            grid_vertex(&s->parts->items[m]->cells, borders[m].vertices[i], v->position);
+            grid_read_vertex_position(&s->parts->items[m]->cells, borders[m].vertices[i], v->position);
             memcpy(v->least_position, v->position, sizeof v->least_position);
         }
         if (!add_corners(s, s->parts->items[m], &borders[m])) return false;
@@ -99,7 +99,7 @@ static bool list_own_corners(twin_search *s)
 
 /* Packs, for each other rank near this one, the corners of this rank that lie in the other rank's box. If mail->words
  * is NULL, the words are only counted. */
-static void write_corners(const twin_search *s, session_mail *mail)
+static void pack_or_count_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->mesh_group->homes;
     mail->total = 0;
@@ -118,9 +118,9 @@ static bool pack_corners(const twin_search *s, session_mail *mail)
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    write_corners(s, mail);
+    pack_or_count_corners(s, mail);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
-    if (mail->words) write_corners(s, mail);
+    if (mail->words) pack_or_count_corners(s, mail);
     return mail->words != NULL;
 }
 
@@ -138,13 +138,13 @@ static bool receive_corners(twin_search *s, const session_mail *in)
 /* ---- common positions of twins (vertices that coincide except for rounding) -------------------------------------- */
 
 /* Finds, for each vertex of this rank, the lexicographically smallest position of the corners that are equal to it. */
-static void find_least_corners(twin_search *s)
+static void find_least_equal_positions(twin_search *s)
 {
     for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {
         const face_corner *c = &s->corners[i];
         session_bin_walk walk = session_begin_bin_walk(&s->bins, c->position, c->position, c->slack);
         int64_t near;
-        while (session_next_binned(&walk, &near)) {
+        while (session_next_point_in_bins(&walk, &near)) {
             border_vertex *v = &s->vertices[near];
             if (session_point_distance(v->position, c->position) <= c->slack &&
                 vector3_compare(c->position, v->least_position) < 0)
@@ -184,18 +184,19 @@ static bool store_all_twins(const twin_search *s)
     return is_done;
 }
 
-insitu_status session_find_twins(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
-                                 const session_team *team, base_error *error)
+insitu_status session_find_coincident_vertices(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                               const session_team *team, base_error *error)
 {
     twin_search s = {.mesh_group = mesh_group, .parts = parts, .team = team};
     session_mail out = {0}, in = {0};
-    for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_position_rounding(parts->items[i]));
+    for (int i = 0; i < parts->count; i++)
+        s.rounding = fmax(s.rounding, session_bound_position_rounding(parts->items[i]));
     if (!error->status && (!list_own_corners(&s) || !pack_corners(&s, &out)))
         session_fail_for_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
     const insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
     if (!status && !error->status) {
         const bool is_taken = receive_corners(&s, &in);
-        if (is_taken) find_least_corners(&s);
+        if (is_taken) find_least_equal_positions(&s);
         if (!is_taken || !store_all_twins(&s))
             session_fail_for_memory(error, s.corner_count * 32, "vertices of several meshes");
     }

@@ -14,7 +14,7 @@
 /* Finds the twins of the mesh group's vertices. Its borders (outer faces of parts, session_catalogue.h) and its
  * session_homes (the ranks near this rank and their bounding boxes) must be up to date. `parts` contains this rank's
  * parts. Errors that occur only on this rank are stored in *error and not returned. Collective. */
-insitu_status session_find_twins(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
-                                 const session_team *team, base_error *error);
+insitu_status session_find_coincident_vertices(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                               const session_team *team, base_error *error);
 
 #endif

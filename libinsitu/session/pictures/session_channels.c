@@ -35,8 +35,8 @@ static void add_frame_statistics(session_frame *sum, const session_frame *frame)
     sum->schedule = frame->schedule;
 }
 
-static insitu_status draw_surface_numbers(const session_frame_target *target, const render_job *job, render_paint paint,
-                                          float *rgba, session_frame *taken, base_error *error)
+static insitu_status draw_surface_channels(const session_frame_target *target, const render_job *job,
+                                           render_paint paint, float *rgba, session_frame *taken, base_error *error)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     const session_frame_target bare = {target->comm, target->compositing, nothing, target->fragment_limit};
@@ -74,7 +74,7 @@ typedef struct surface_numbers {
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
 } surface_numbers;
 
-static void add_numbers_of_layer(surface_numbers *n, int layer, int surfaces)
+static void append_surface_indices_of_layer(surface_numbers *n, int layer, int surfaces)
 {
     for (int i = 0; i < surfaces && n->count < RENDER_MAX_ISOVALUES; i++) {
         n->layer[n->count] = (float)layer;
@@ -85,24 +85,24 @@ static void add_numbers_of_layer(surface_numbers *n, int layer, int surfaces)
 /* Lists, for all surfaces of the image in the order of the job, the index of the layer and the index within the
  * layer. If has_shells is set, each isosurface layer also has contour lines on shells, which are one more surface
  * of the job. */
-static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
+static surface_numbers list_surface_indices(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
     for (int i = 0; i < image->isosurface_count; i++)
-        add_numbers_of_layer(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
+        append_surface_indices_of_layer(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
     for (int i = 0; i < image->isosurface_count && has_shells; i++)
-        add_numbers_of_layer(&out, image->isosurfaces[i].number, 1);
-    for (int i = 0; i < image->surface_count; i++) add_numbers_of_layer(&out, image->surfaces[i].number, 1);
+        append_surface_indices_of_layer(&out, image->isosurfaces[i].number, 1);
+    for (int i = 0; i < image->surface_count; i++) append_surface_indices_of_layer(&out, image->surfaces[i].number, 1);
     for (int i = 0; i < image->slice_count; i++)
-        add_numbers_of_layer(&out, image->slices[i].number, image->slices[i].plane_count);
+        append_surface_indices_of_layer(&out, image->slices[i].number, image->slices[i].plane_count);
     return out;
 }
 
 /* Converts the data of each pixel from (value, index of the surface in the job, 0, opacity) to (value, index of the
  * layer, index of the surface within the layer, opacity). */
-static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
+static void convert_surface_indices(const scene_image *image, bool has_shells, float *values, int threads)
 {
-    const surface_numbers numbers = number_surfaces(image, has_shells);
+    const surface_numbers numbers = list_surface_indices(image, has_shells);
     const int64_t pixels = (int64_t)image->width * image->height;
 #pragma omp parallel num_threads(threads)
     {
@@ -150,14 +150,14 @@ insitu_status session_draw_channels(const session_frame_target *target, const se
     insitu_status status = session_agree(team->comm, error);
     if (!status) {
         const render_job opaque = make_opaque_job(job, surfaces);
-        status = draw_surface_numbers(target, &opaque, RENDER_NORMALS, out->normals, taken, error);
-        if (!status) status = draw_surface_numbers(target, &opaque, RENDER_VALUES, out->values, taken, error);
+        status = draw_surface_channels(target, &opaque, RENDER_NORMALS, out->normals, taken, error);
+        if (!status) status = draw_surface_channels(target, &opaque, RENDER_VALUES, out->values, taken, error);
     }
     base_free(surfaces);
     if (!status && team->rank == 0) {
         int surfaces_given = image->isosurface_count + image->surface_count;
         for (int i = 0; i < image->slice_count; i++) surfaces_given += image->slices[i].plane_count;
-        convert_surface_numbers(image, job->surface_count > surfaces_given, out->values, team->threads);
+        convert_surface_indices(image, job->surface_count > surfaces_given, out->values, team->threads);
         fill_channel_items(out);
     }
     return status;

@@ -10,7 +10,7 @@ bool session_needs_deep_samples(const scene_image *image)
     return false;
 }
 
-insitu_status session_begin_deep(deep_image *deep, const scene_image *image, base_error *error)
+insitu_status session_create_deep_image(deep_image *deep, const scene_image *image, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     deep->first = base_calloc(pixels, sizeof *deep->first);
@@ -20,12 +20,12 @@ insitu_status session_begin_deep(deep_image *deep, const scene_image *image, bas
                      image->name, (long long)pixels);
 }
 
-static float depth_from_parameter(float t, const render_space *space)
+static float convert_parameter_to_depth(float t, const render_space *space)
 {
     return (float)((double)t / space->scale + space->depth_origin);
 }
 
-void session_finish_deep(deep_image *deep, const render_space *space, int threads)
+void session_convert_deep_depths(deep_image *deep, const render_space *space, int threads)
 {
     if (!deep->count) return;
 #pragma omp parallel num_threads(threads)
@@ -33,8 +33,8 @@ void session_finish_deep(deep_image *deep, const render_space *space, int thread
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t i = 0; i < deep->count; i++) {
-            deep->samples[i].z = depth_from_parameter(deep->samples[i].z, space);
-            deep->samples[i].z_back = depth_from_parameter(deep->samples[i].z_back, space);
+            deep->samples[i].z = convert_parameter_to_depth(deep->samples[i].z, space);
+            deep->samples[i].z_back = convert_parameter_to_depth(deep->samples[i].z_back, space);
         }
         region_leave();
     }
@@ -47,7 +47,7 @@ int64_t session_deep_bytes(const deep_image *deep, int width, int height)
            pixels * (int64_t)(sizeof *deep->first + sizeof *deep->counts);
 }
 
-void session_free_deep(deep_image *deep)
+void session_free_deep_image(deep_image *deep)
 {
     base_free(deep->samples);
     base_free(deep->first);

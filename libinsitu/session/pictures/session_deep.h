@@ -16,14 +16,14 @@
 bool session_needs_deep_samples(const scene_image *image);
 
 /* Initializes a deep picture without samples. Called on rank 0 only. Local. */
-insitu_status session_begin_deep(deep_image *deep, const scene_image *image, base_error *error);
+insitu_status session_create_deep_image(deep_image *deep, const scene_image *image, base_error *error);
 
 /* Converts depths from the ray parameter t, which compositing uses, to distances along the camera's axis. Local. */
-void session_finish_deep(deep_image *deep, const render_space *space, int threads);
+void session_convert_deep_depths(deep_image *deep, const render_space *space, int threads);
 
 /* Returns the size of a deep picture in bytes. */
 int64_t session_deep_bytes(const deep_image *deep, int width, int height);
 
-void session_free_deep(deep_image *deep);
+void session_free_deep_image(deep_image *deep);
 
 #endif

@@ -49,11 +49,11 @@ typedef struct difference_exchange {
  * the rank has an error. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
-static insitu_status share_ranges(difference_exchange *d, base_error *error)
+static insitu_status reduce_field_ranges(difference_exchange *d, base_error *error)
 {
     double shared[SHARED] = {0}, ranges[RENDER_MAX_ISOVALUES][2];
     for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) shared[2 * i] = shared[2 * i + 1] = -INFINITY;
-    render_differences_ranges(d->job, ranges);
+    render_compute_field_ranges(d->job, ranges);
     for (int i = 0; i < d->job->surface_count; i++) {
         shared[2 * i] = -ranges[i][0];
         shared[2 * i + 1] = ranges[i][1];
@@ -90,7 +90,7 @@ static void list_near_ranks(difference_exchange *d)
     }
 }
 
-static insitu_status share_boxes(difference_exchange *d, base_error *error)
+static insitu_status gather_boxes_of_ranks(difference_exchange *d, base_error *error)
 {
     const render_box own = render_differences_box(d->job);
     const int doubles = sizeof own / sizeof(double);
@@ -104,7 +104,7 @@ static insitu_status share_boxes(difference_exchange *d, base_error *error)
 
 /* Packs, for each near rank, those hits of the round with sample points that may lie in the rank's box. Returns false
  * if memory runs out. */
-static bool write_requests(difference_exchange *d, session_mail *out)
+static bool pack_sample_requests(difference_exchange *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
@@ -115,7 +115,7 @@ static bool write_requests(difference_exchange *d, session_mail *out)
     for (int n = 0; n < d->near_count; n++)
         for (int64_t i = 0; i < d->count; i++) {
             const render_pending_hit *hit = &d->list->items[d->first + i];
-            if (!render_differences_meet(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
+            if (!render_difference_points_meet_box(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
             if (requests == capacity) {
                 capacity += capacity / 2 + 1024;
                 uint64_t *words = base_realloc(out->words, (size_t)capacity * REQUEST_WORDS * sizeof *words);
@@ -134,7 +134,8 @@ static bool write_requests(difference_exchange *d, session_mail *out)
 
 /* Computes the answers to the requests in *in. Requests are read directly from the message, because its words are
  * sufficiently aligned for the type of a hit. */
-static bool write_answers(const difference_exchange *d, const session_mail *in, session_mail *out, base_error *error)
+static bool pack_sample_answers(const difference_exchange *d, const session_mail *in, session_mail *out,
+                                base_error *error)
 {
     const int64_t count = in->total / REQUEST_WORDS;
     out->total = count * ANSWER_WORDS;
@@ -149,12 +150,13 @@ static bool write_answers(const difference_exchange *d, const session_mail *in, 
 
 /* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange of messages
  * reports it to all ranks. */
-static insitu_status exchange_round(difference_exchange *d, base_error *error)
+static insitu_status exchange_samples_of_round(difference_exchange *d, base_error *error)
 {
     session_mail sent_requests = {0}, received_requests = {0}, sent_answers = {0}, received_answers = {0};
-    if (!write_requests(d, &sent_requests)) session_fail_for_memory(error, d->count * 24, "samples of other ranks");
+    if (!pack_sample_requests(d, &sent_requests))
+        session_fail_for_memory(error, d->count * 24, "samples of other ranks");
     insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &sent_requests, &received_requests, error);
-    if (!status && !error->status && !write_answers(d, &received_requests, &sent_answers, error))
+    if (!status && !error->status && !pack_sample_answers(d, &received_requests, &sent_answers, error))
         session_fail_for_memory(error, received_requests.total * 16, "samples for other ranks");
     if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &sent_answers, &received_answers, error);
     if (!status && !error->status)
@@ -188,21 +190,21 @@ static void light_hits_of_round(const difference_exchange *d, fragment_list *fra
         fragments->count = count;
 }
 
-static insitu_status run_rounds(difference_exchange *d, fragment_list *fragments, base_error *error)
+static insitu_status light_hits_in_rounds(difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int64_t round = 0; round < d->rounds && !status; round++) {
         const int64_t left = d->list->count - d->first;
         d->count = left < d->round_hits ? left : d->round_hits;
         if (!error->status) render_sample_pending_hits(d->job, d->list->items + d->first, d->samples, d->count, error);
-        status = exchange_round(d, error);
+        status = exchange_samples_of_round(d, error);
         if (!status && !error->status) light_hits_of_round(d, fragments, error);
         d->first += d->count;
     }
     return status;
 }
 
-static insitu_status compute_differences(difference_exchange *d, fragment_list *fragments, base_error *error)
+static insitu_status compute_normals_by_differences(difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     const int64_t most = d->list->count < d->round_hits ? d->list->count : d->round_hits;
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
@@ -210,24 +212,24 @@ static insitu_status compute_differences(difference_exchange *d, fragment_list *
     d->near_ranks = base_alloc((size_t)d->ranks * sizeof *d->near_ranks);
     if (!d->samples || !d->boxes || !d->near_ranks || !render_differences_sort(d->job, d->list))
         session_fail_for_memory(error, most * 64, "normals by differences");
-    insitu_status status = share_ranges(d, error);
-    if (!status && d->rounds) status = share_boxes(d, error);
-    if (!status) status = run_rounds(d, fragments, error);
+    insitu_status status = reduce_field_ranges(d, error);
+    if (!status && d->rounds) status = gather_boxes_of_ranks(d, error);
+    if (!status) status = light_hits_in_rounds(d, fragments, error);
     base_free(d->samples);
     base_free(d->boxes);
     base_free(d->near_ranks);
     return status;
 }
 
-insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
-                                           base_error *error)
+insitu_status session_light_hits_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments,
+                                                double *ms, base_error *error)
 {
     const double start = MPI_Wtime();
     difference_exchange d = {.comm = comm, .job = job, .list = job->waiting};
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
     d.round_hits = session_count_items_per_round(d.ranks, ROUND_HITS);
-    const insitu_status status = compute_differences(&d, fragments, error);
+    const insitu_status status = compute_normals_by_differences(&d, fragments, error);
     base_free(d.list->items);
     base_free(d.list->shadings);
     *d.list = (render_pending_list){0};

@@ -14,7 +14,7 @@
  * *ms. If tracing has failed on this rank, *error must contain the error before the call. Collective; all ranks return
  * the same status. An error that occurs on this rank after the last exchange of messages is only stored in *error; the
  * next phase passes it to all ranks. */
-insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
-                                           base_error *error);
+insitu_status session_light_hits_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments,
+                                                double *ms, base_error *error);
 
 #endif

@@ -53,7 +53,7 @@ static void canvas_free(canvas *c, session_writer *writer)
     base_free(c->edges);
     base_free(c->edge_sums);
     session_free_channels(&c->channels);
-    session_free_deep(&c->deep);
+    session_free_deep_image(&c->deep);
     session_free_decorations(c->decorations);
 }
 
@@ -106,7 +106,7 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (!out->frame.rgba || (is_summed && !out->frame_sum))
         return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->frame_sum : 0)),
                                        "a picture");
-    return session_needs_deep_samples(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
+    return session_needs_deep_samples(image) ? session_create_deep_image(&out->deep, image, error) : INSITU_OK;
 }
 
 static void add_frame_to_sum(canvas *c, int threads)
@@ -124,7 +124,7 @@ static void add_frame_to_sum(canvas *c, int threads)
 
 /* Allocates memory for the pixels at edges, and for frames that contain only these pixels. Returns false if memory runs
  * out. */
-static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
+static bool canvas_allocate_edge_pixels(canvas *c, const unsigned char *pixels)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height, edges = pixel_set_count(pixels, count);
     c->samples.rgba = base_alloc((size_t)count * 4 * sizeof *c->samples.rgba);
@@ -175,7 +175,7 @@ static void average_frames(canvas *c, int frames, int threads)
 }
 
 /* Converts depths from the ray parameter t to distances along the camera's axis. Infinite depths are kept. */
-static void scale_depths(canvas *c, const render_space *space, int threads)
+static void convert_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
 #pragma omp parallel num_threads(threads)
@@ -192,8 +192,8 @@ static void canvas_finish(canvas *c, int frames, const render_space *space, int 
 {
     if (c->frame_sum) average_frames(c, frames, threads);
     average_edges(c, frames, threads);
-    if (c->frame.depth) scale_depths(c, space, threads);
-    session_finish_deep(&c->deep, space, threads);
+    if (c->frame.depth) convert_depths(c, space, threads);
+    session_convert_deep_depths(&c->deep, space, threads);
 }
 
 /* ---- drawing the frames of an image ------------------------------------------------------------------------------ */
@@ -274,7 +274,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
 
 /* Finds the pixels at edges (which differ visibly from a neighbour) in rank 0's picture, and sends the set of these
  * pixels to all ranks. The caller must free *pixels. */
-static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
+static insitu_status find_and_broadcast_edge_pixels(frames_basis *b, unsigned char **pixels, base_error *error)
 {
     canvas *c = b->canvas;
     const session_team *team = b->drawing->team;
@@ -282,7 +282,7 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     *pixels = base_calloc(bytes, 1);
     bool has_memory = *pixels != NULL;
     if (has_memory && team->rank == 0)
-        has_memory = comp_find_edges(&c->frame, team->threads, *pixels) && canvas_begin_edges(c, *pixels);
+        has_memory = comp_find_edges(&c->frame, team->threads, *pixels) && canvas_allocate_edge_pixels(c, *pixels);
     if (!has_memory) session_fail_for_memory(error, (int64_t)bytes, "the pixels at edges");
     const insitu_status status = session_agree(team->comm, error);
     if (status) return status;
@@ -291,8 +291,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
 
 /* Draws the image's frames for antialiasing; the position in the pixel through which rays pass differs from frame to
  * frame. If only pixels at edges are drawn, job->pixels is the set of these pixels. */
-static insitu_status draw_frames_of_samples(frames_basis *b, const scene_image *image, render_job *job,
-                                            base_error *error)
+static insitu_status draw_antialiasing_frames(frames_basis *b, const scene_image *image, render_job *job,
+                                              base_error *error)
 {
     canvas *c = b->canvas;
     insitu_status status = INSITU_OK;
@@ -314,13 +314,13 @@ static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, 
     canvas *c = b->canvas;
     unsigned char *pixels = NULL;
     if (image->antialias == 1 || !(needs_frames_only_at_edges(image) || needs_depth(b->drawing, image)))
-        return draw_frames_of_samples(b, image, job, error);
+        return draw_antialiasing_frames(b, image, job, error);
     insitu_status status = draw_frame(b, job, &c->frame, error);
-    if (!status && needs_frames_only_at_edges(image)) status = share_edges(b, &pixels, error);
+    if (!status && needs_frames_only_at_edges(image)) status = find_and_broadcast_edge_pixels(b, &pixels, error);
     job->pixels = pixels;
     c->depth = c->frame.depth;
     c->frame.depth = NULL;
-    if (!status) status = draw_frames_of_samples(b, image, job, error);
+    if (!status) status = draw_antialiasing_frames(b, image, job, error);
     c->frame.depth = c->depth;
     base_free(pixels);
     return status;
@@ -416,8 +416,8 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
 /* Passes a picture to the writer of rank 0. If pictures are written after the step, the only possible error is that
  * rank 0 lacks memory; the next step reports it together with the errors of the writing thread. ranges: the image's
  * colour ranges over the run, which are written too; NULL: the image has none. */
-static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
-                                   session_image_ranges *ranges, base_error *error)
+static insitu_status pass_picture_to_writer(const session_drawing *d, const scene_image *image, canvas *c,
+                                            session_image_ranges *ranges, base_error *error)
 {
     const double start = MPI_Wtime();
     const bool is_told_later = d->writes_behind && !d->kept->is_enabled && !ranges;
@@ -451,7 +451,8 @@ static int find_areas_under_insets_of_image(const scene *scene, const scene_imag
 
 /* Warns on rank 0 of texts that cannot be drawn as they are written. Their layout is computed here only so that the
  * warnings are reported in this step; the writing thread computes the layout a second time. */
-static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
+static void warn_of_undrawable_text(const session_drawing *d, const scene_image *image,
+                                    const session_decorations *decorations)
 {
     insitu_word_faults faults;
     insitu_rectangle covered[SCENE_ANCHORS];
@@ -481,7 +482,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline, d->catalogue});
         if (!out->decorations) session_fail_for_memory(error, (int64_t)sizeof *out->decorations, "decorations");
-        if (out->decorations && scene_draws_text(image)) warn_of_words(d, image, out->decorations);
+        if (out->decorations && scene_draws_text(image)) warn_of_undrawable_text(d, image, out->decorations);
     }
     session_free_outline(&outline);
     return INSITU_OK;
@@ -504,7 +505,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     session_layers layers = {0};
     canvas canvas = {0};
     insitu_status status = session_make_view(d->space, d->scene_path, image, d->team, d->report, &view, error);
-    if (!status) status = session_open_run_ranges(d->run_ranges, image, d->team, &basis.run_ranges, error);
+    if (!status) status = session_find_or_read_run_ranges(d->run_ranges, image, d->team, &basis.run_ranges, error);
     if (status) return status;
     if (!error->status) canvas_create(d, image, &canvas, error);
     status = session_make_layers(&basis, image, &layers, error);
@@ -512,7 +513,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
         if (d->kept->is_enabled && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);
-        status = write_outputs(d, image, &canvas, basis.run_ranges, error);
+        status = pass_picture_to_writer(d, image, &canvas, basis.run_ranges, error);
         d->report->public_report.images++;
     }
     session_layers_free(&layers);
@@ -522,7 +523,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
 
 /* Writes the montages and the tables of databases on rank 0. The tables contain lines for all pictures of the step.
  * Collective. */
-static void write_tables(const session_drawing *d, base_error *first)
+static void queue_montages_and_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};
     if (d->scene->database_count == 0 && d->scene->montage_count == 0) return;
@@ -571,15 +572,15 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {
             *drawn |= (uint64_t)1 << placed.variant.source;
-            session_record_written(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
-                                   d->report->public_report.time, d->report);
+            session_record_written_files(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
+                                         d->report->public_report.time, d->report);
         }
         if (first.status == INSITU_OK) first = reason;
     }
     warn_of_different_colour_bars(d);
     base_free(own.shared_bars);
-    if (has_lines) session_share_warnings(d->report, 0, d->team, &first);
-    write_tables(d, &first);
+    if (has_lines) session_broadcast_warnings(d->report, 0, d->team, &first);
+    queue_montages_and_tables(d, &first);
     if (first.status) *error = first;
     return error->status;
 }

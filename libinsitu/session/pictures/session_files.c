@@ -67,7 +67,7 @@ static double read_clock_milliseconds(void)
 }
 
 /* Writes the files that are written after all pictures of a step: montages and the tables of databases. */
-static void write_tables(session_files *files)
+static void write_montages_and_tables(session_files *files)
 {
     base_error reason = {0};
     session_write_montages(files->montages, files->scene, &reason);
@@ -81,7 +81,7 @@ void session_write_files(session_files *files)
     if (files->news)
         session_write_report_json(files->scene, files->news, &files->error);
     else if (!files->has_picture)
-        write_tables(files);
+        write_montages_and_tables(files);
     for (int i = 0; files->has_picture && i < files->image.output_count; i++)
         write_output(files, &files->image.outputs[i]);
     files->ms = read_clock_milliseconds() - start;
@@ -92,7 +92,7 @@ void session_files_free(session_files *files)
     if (!files) return;
     session_drop_picture(&files->memory);
     session_free_channels(&files->channels);
-    session_free_deep(&files->deep);
+    session_free_deep_image(&files->deep);
     session_free_decorations(files->decorations);
     base_free(files->news);
     base_free(files);

@@ -33,8 +33,8 @@ static void add_to_frame(session_frame *frame, const render_statistics *rendered
 
 /* Draws a frame if there is only one rank. The fragments of a tile of pixels are composited as soon as the tile's rays
  * have been traced (comp_tiles.h). */
-static insitu_status draw_alone(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
-                                comp_overlaps *overlaps, base_error *error)
+static insitu_status draw_frame_on_single_rank(const session_frame_target *t, const render_job *job, image *out,
+                                               session_frame *frame, comp_overlaps *overlaps, base_error *error)
 {
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -63,7 +63,7 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
     traced.waiting_ranges = ranges;
     if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
     if (!traced.waiting) return INSITU_OK;
-    return session_light_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
+    return session_light_hits_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
 /* Computes the lighting of the fragments. The occluders, by which rays to lights may be blocked, are built once per
@@ -77,14 +77,14 @@ static insitu_status light_fragments(const session_frame_target *t, const render
     return session_light_fragments(t->comm, job, &frame->occluders, fragments, &rendered->surface_ms, error);
 }
 
-static insitu_status draw_frame(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
-                                comp_overlaps *overlaps, base_error *error)
+static insitu_status trace_and_composite_frame(const session_frame_target *t, const render_job *job, image *out,
+                                               session_frame *frame, comp_overlaps *overlaps, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
     const bool is_unlit = job->paint == RENDER_UNLIT;
     if (ranks == 1 && job->part_count > 0 && !out->deep && !is_unlit)
-        return draw_alone(t, job, out, frame, overlaps, error);
+        return draw_frame_on_single_rank(t, job, out, frame, overlaps, error);
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -114,7 +114,7 @@ static insitu_status draw_frame(const session_frame_target *t, const render_job 
 /* Estimates the number of pixels that produce fragment_limit fragments. The number of samples per pixel is estimated as
  * 2 divided by the distance between samples, because a ray is about 1, and at most sqrt(3), long within the scene in
  * scaled units. The number of segments per pixel is an empirical value. */
-static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limit)
+static int64_t estimate_pixels_per_pass(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
     const bool is_sampled = job->integration == RENDER_SAMPLES;
@@ -128,8 +128,8 @@ static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limi
 /* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the previous
  * turn. The growth is limited, since the few pixels of a turn may not be representative. Collective; the result is the
  * same on all ranks. */
-static insitu_status update_turn_pixels(const session_frame_target *t, int64_t fragments, int64_t *pixels,
-                                        base_error *error)
+static insitu_status update_pixels_per_pass(const session_frame_target *t, int64_t fragments, int64_t *pixels,
+                                            base_error *error)
 {
     enum { MOST_GROWTH = 8 };
     int64_t most = 0;
@@ -164,7 +164,7 @@ static int64_t greatest_common_divisor(int64_t a, int64_t b)
     return a;
 }
 
-static turn_order make_turn_order(const image *out)
+static turn_order make_pixel_order(const image *out)
 {
     turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
     order.squares = (int64_t)order.squares_per_row * ((out->height + SQUARE - 1) / SQUARE);
@@ -174,7 +174,7 @@ static turn_order make_turn_order(const image *out)
 }
 
 /* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
-static int64_t find_pixel_in_turn_order(const turn_order *order, int64_t k)
+static int64_t find_pixel_in_order(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
     const int64_t x = square % order->squares_per_row * SQUARE + k % SQUARE;
@@ -184,14 +184,14 @@ static int64_t find_pixel_in_turn_order(const turn_order *order, int64_t k)
 
 /* Stores in `taken` the next pixels of the set `from`, at most `most`, starting at position `first` of the turn order.
  * Returns the position at which the next turn continues. */
-static int64_t select_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
-                                  unsigned char *taken)
+static int64_t select_pixels_of_pass(const image *out, const unsigned char *from, int64_t first, int64_t most,
+                                     unsigned char *taken)
 {
-    const turn_order order = make_turn_order(out);
+    const turn_order order = make_pixel_order(out);
     const int64_t end = order.squares * SQUARE * SQUARE;
     memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {
-        const int64_t pixel = find_pixel_in_turn_order(&order, first);
+        const int64_t pixel = find_pixel_in_order(&order, first);
         if (pixel < 0 || !pixel_set_has(from, pixel)) continue;
         pixel_set_add(taken, pixel);
         most--;
@@ -199,7 +199,7 @@ static int64_t select_turn_pixels(const image *out, const unsigned char *from, i
     return first;
 }
 
-static void copy_pixels(const unsigned char *pixels, const image *from, image *to)
+static void copy_selected_pixels(const unsigned char *pixels, const image *from, image *to)
 {
     const int64_t count = (int64_t)to->width * to->height;
     for (int64_t p = 0; p < count; p++) {
@@ -211,7 +211,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
 
 /* Removes the samples of the pixels in the set `pixels` from the deep picture on rank 0, because these pixels are drawn
  * again. */
-static void remove_samples(const unsigned char *pixels, const image *out)
+static void remove_deep_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;
     for (int64_t p = 0; p < count; p++)
@@ -255,7 +255,7 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
                                      session_frame *frame, base_error *error)
 {
     const bool is_sampled = job->integration == RENDER_SAMPLES;
-    int64_t doubled = 0, most = estimate_turn_pixels(job, t->fragment_limit);
+    int64_t doubled = 0, most = estimate_pixels_per_pass(job, t->fragment_limit);
     render_job again = *job;
     again.pixels = second->turn_pixels;
     again.separate_samples = true;
@@ -263,24 +263,26 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
     for (int64_t left = overlaps->count, at = 0; left > 0;) {
         const int64_t before = frame->fragments;
         comp_overlaps found = {0};
-        at = select_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
-        if (out->deep && out->deep->counts) remove_samples(second->turn_pixels, out);
-        insitu_status status = draw_frame(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
+        at = select_pixels_of_pass(out, overlaps->pixels, at, most, second->turn_pixels);
+        if (out->deep && out->deep->counts) remove_deep_samples(second->turn_pixels, out);
+        insitu_status status =
+            trace_and_composite_frame(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
-        if (second->picture.rgba) copy_pixels(second->turn_pixels, &second->picture, out);
+        if (second->picture.rgba) copy_selected_pixels(second->turn_pixels, &second->picture, out);
         frame->turns++;
         left -= most;
-        if (left > 0) status = update_turn_pixels(t, frame->fragments - before, &most, error);
+        if (left > 0) status = update_pixels_per_pass(t, frame->fragments - before, &most, error);
         if (status) return status;
     }
     if (doubled) frame->overlaps = overlaps->count;
     return INSITU_OK;
 }
 
-static insitu_status draw_overlaps(const session_frame_target *t, const render_job *job, const comp_overlaps *overlaps,
-                                   image *out, session_frame *frame, base_error *error)
+static insitu_status redraw_overlaps_in_second_picture(const session_frame_target *t, const render_job *job,
+                                                       const comp_overlaps *overlaps, image *out, session_frame *frame,
+                                                       base_error *error)
 {
     second_picture second;
     insitu_status status = second_picture_create(t, overlaps, out, &second, error);
@@ -319,13 +321,13 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         status = mark_all_pixels(t, out, &overlaps, error);
     } else {
         out->is_folded = job->reproducible && job->volume_count > 0;
-        status = draw_frame(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
+        status = trace_and_composite_frame(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
         /* the count includes pixels in which, because of rounding, a sample at the common face of two cells is in both
          * cells; redraw_overlaps() therefore sets frame->overlaps after drawing each sample as a separate fragment */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
-    if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);
+    if (!status && overlaps.count) status = redraw_overlaps_in_second_picture(t, job, &overlaps, out, frame, error);
     base_free(overlaps.pixels);
     render_occluders_free(frame->occluders);
     frame->occluders = NULL;

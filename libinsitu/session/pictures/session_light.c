@@ -56,7 +56,7 @@ typedef struct request_list {
     bool has_no_memory;
 } request_list;
 
-static insitu_status share_boxes(lighting *l, base_error *error)
+static insitu_status gather_occluder_boxes_of_ranks(lighting *l, base_error *error)
 {
     const render_box own = render_occluder_box(l->job);
     const int doubles = sizeof own / sizeof(double);
@@ -70,7 +70,7 @@ static insitu_status share_boxes(lighting *l, base_error *error)
 
 /* ---- sending requests -------------------------------------------------------------------------------------------- */
 
-static bool reserve_requests(request_list *q)
+static bool grow_request_list(request_list *q)
 {
     const int64_t capacity = q->capacity + q->capacity / 2 + 1024;
     int *ranks = base_realloc(q->ranks, (size_t)capacity * sizeof *ranks);
@@ -97,7 +97,7 @@ static void add_request(void *state, int rank, const render_hit_rays *rays)
 {
     request_list *q = state;
     if (rank == q->lighting_state->rank || q->has_no_memory) return;
-    if (q->count == q->capacity && !reserve_requests(q)) {
+    if (q->count == q->capacity && !grow_request_list(q)) {
         q->has_no_memory = true;
         return;
     }
@@ -119,7 +119,7 @@ static bool sort_requests(request_list *q)
     return true;
 }
 
-static bool write_requests(const lighting *l, const request_list *q, session_mail *out)
+static bool pack_ray_requests(const lighting *l, const request_list *q, session_mail *out)
 {
     out->total = q->count * REQUEST_WORDS;
     out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
@@ -142,9 +142,9 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
     *q = (request_list){.lighting_state = l};
     for (q->current_hit = 0; q->current_hit < l->count; q->current_hit++)
         if (l->rays[q->current_hit].samples || l->rays[q->current_hit].lights)
-            render_rays_to_boxes(l->job, &l->hits[q->current_hit], &l->rays[q->current_hit], l->boxes, l->ranks,
-                                 add_request, q);
-    if (q->has_no_memory || !sort_requests(q) || !write_requests(l, q, &out))
+            render_find_boxes_met_by_rays(l->job, &l->hits[q->current_hit], &l->rays[q->current_hit], l->boxes,
+                                          l->ranks, add_request, q);
+    if (q->has_no_memory || !sort_requests(q) || !pack_ray_requests(l, q, &out))
         session_fail_for_memory(error, q->count * REQUEST_WORDS * 8, "rays to other ranks");
     insitu_status status = session_agree(l->comm, error);
     if (!status) status = session_mail_exchange(l->comm, &out, in, error);
@@ -156,7 +156,7 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
 
 /* Copies the requests into an array of hits and an array of rays, because in the message each hit is followed by its
  * rays. */
-static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
+static bool unpack_ray_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / REQUEST_WORDS;
     *hits = base_alloc((size_t)count * sizeof **hits);
@@ -176,8 +176,8 @@ static insitu_status answer_requests(const lighting *l, session_mail *in, base_e
     render_hit *hits = NULL;
     render_hit_rays *rays = NULL;
     const int64_t count = in->total / REQUEST_WORDS;
-    if (read_requests(in, &hits, &rays))
-        render_occlude(l->occluders, hits, rays, count, error);
+    if (unpack_ray_requests(in, &hits, &rays))
+        render_clear_blocked_rays(l->occluders, hits, rays, count, error);
     else
         session_fail_for_memory(error, in->total * 8, "rays of other ranks");
     if (!error->status && rays) memcpy(in->words, rays, (size_t)count * sizeof *rays);
@@ -188,7 +188,7 @@ static insitu_status answer_requests(const lighting *l, session_mail *in, base_e
     return session_agree(l->comm, error);
 }
 
-static void store_answers(lighting *l, const request_list *q, const session_mail *answers)
+static void clear_blocked_rays(lighting *l, const request_list *q, const session_mail *answers)
 {
     for (int64_t i = 0; i < q->count; i++) {
         const int64_t k = q->message_order[i];
@@ -207,7 +207,7 @@ static insitu_status exchange_requests(lighting *l, base_error *error)
     insitu_status status = send_requests(l, &q, &in, error);
     if (!status) status = answer_requests(l, &in, error);
     if (!status) status = session_mail_exchange(l->comm, &in, &answers, error);
-    if (!status) store_answers(l, &q, &answers);
+    if (!status) clear_blocked_rays(l, &q, &answers);
     session_mail_free(&in);
     session_mail_free(&answers);
     free_requests(&q);
@@ -224,7 +224,7 @@ static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first
     static const render_hit_rays none = {0, 0, 0};
     for (l->count = 0; first < fragments->count && l->count < l->round_hits; first++) {
         fragment *f = &fragments->items[first];
-        if (render_hit_of(l->job, f, &l->hits[l->count], &l->rays[l->count]))
+        if (render_make_hit_from_fragment(l->job, f, &l->hits[l->count], &l->rays[l->count]))
             l->fragments[l->count++] = first;
         else
             render_light_fragment(l->job, &none, f);
@@ -248,14 +248,14 @@ static insitu_status any_rank_has_more_fragments(const lighting *l, bool has_mor
     return status;
 }
 
-static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_error *error)
+static insitu_status light_fragments_in_rounds(lighting *l, fragment_list *fragments, base_error *error)
 {
     int64_t at = 0;
     bool goes_on = false;
     insitu_status status = any_rank_has_more_fragments(l, fragments->count > 0, &goes_on, error);
     while (!status && goes_on) {
         at = collect_hits(l, fragments, at);
-        render_occlude(l->occluders, l->hits, l->rays, l->count, error);
+        render_clear_blocked_rays(l->occluders, l->hits, l->rays, l->count, error);
         status = session_agree(l->comm, error);
         if (!status && l->ranks > 1) status = exchange_requests(l, error);
         if (!status) shade_hits(l, fragments);
@@ -282,8 +282,8 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, rend
         render_occluders_create(job, occluders, error);
     l.occluders = *occluders;
     insitu_status status = session_agree(comm, error);
-    if (!status) status = share_boxes(&l, error);
-    if (!status) status = light_rounds(&l, fragments, error);
+    if (!status) status = gather_occluder_boxes_of_ranks(&l, error);
+    if (!status) status = light_fragments_in_rounds(&l, fragments, error);
     base_free(l.fragments);
     base_free(l.hits);
     base_free(l.rays);

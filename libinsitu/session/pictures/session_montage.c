@@ -91,12 +91,12 @@ static void free_montage(session_montage *m)
 
 /* Returns the address, within the montage's pixels, of the first pixel of row y of the smaller picture at this
  * place. */
-static float *find_row(const insitu_place *place, int y)
+static float *get_row_address(const insitu_place *place, int y)
 {
     return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
 }
 
-static size_t row_size(int width)
+static size_t get_row_bytes(int width)
 {
     return 4 * (size_t)width * sizeof(float);
 }
@@ -110,7 +110,8 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     m->panels[panel] = session_copy_decorations(decorations);
     if (!m->panels[panel]) return fail_for_memory(of, error);
     for (int y = 0; y < picture->height; y++)
-        memcpy(find_row(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y, row_size(picture->width));
+        memcpy(get_row_address(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y,
+               get_row_bytes(picture->width));
     return INSITU_OK;
 }
 
@@ -119,7 +120,7 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
 static insitu_status keep_inset(const scene_montage *of, session_inset *inset, const scene_output *output,
                                 const insitu_image *picture, const session_decorations *decorations, base_error *error)
 {
-    const size_t size = row_size(picture->width) * (size_t)picture->height;
+    const size_t size = get_row_bytes(picture->width) * (size_t)picture->height;
     inset->has_decorations = output->has_decorations;
     inset->decorations = decorations ? session_copy_decorations(decorations) : NULL;
     if (!decorations || inset->decorations) inset->rgba = base_alloc(size);
@@ -196,14 +197,14 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
         .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
     const insitu_place place = find_panel_region(of, m->rgba, panel);
     for (int y = 0; y < of->height; y++)
-        memcpy(buffer + 4 * (ptrdiff_t)of->width * y, find_row(&place, y), row_size(of->width));
+        memcpy(buffer + 4 * (ptrdiff_t)of->width * y, get_row_address(&place, y), get_row_bytes(of->width));
     if (!has_bars) decorations.bar_count = 0;
     return draw_panel(of, m, panel, &picture, error);
 }
 
 /* Draws the shared bars into the strip beside the panels, with text as large as in the panels. */
-static insitu_status draw_strip(const scene_montage *of, session_montage *m, const session_decorations *shared,
-                                base_error *error)
+static insitu_status draw_shared_bars(const scene_montage *of, session_montage *m, const session_decorations *shared,
+                                      base_error *error)
 {
     const int height = compute_montage_height(of);
     insitu_decorations decorations = shared->background;
@@ -223,28 +224,28 @@ static insitu_status draw_strip(const scene_montage *of, session_montage *m, con
 
 /* Draws the decorations of all panels, and the bars that they share. shared: decorations that contain these bars; NULL:
  * no bars are shared. */
-static insitu_status finish_panels(const scene_montage *of, session_montage *m, const session_decorations *shared,
-                                   base_error *error)
+static insitu_status decorate_all_panels(const scene_montage *of, session_montage *m, const session_decorations *shared,
+                                         base_error *error)
 {
     float *buffer = base_alloc(4 * (size_t)of->width * (size_t)of->height * sizeof *buffer);
     insitu_status status = buffer ? INSITU_OK : fail_for_memory(of, error);
     for (int i = 0; i < of->panel_count && !status; i++)
         if (m->panels[i]) status = decorate_panel(of, m, i, !shared, buffer, error);
     base_free(buffer);
-    return status || !shared ? status : draw_strip(of, m, shared, error);
+    return status || !shared ? status : draw_shared_bars(of, m, shared, error);
 }
 
 /* ---- drawing insets ---------------------------------------------------------------------------------------------- */
 
 /* Draws the frame around an inset, in a grey that is visible on dark and light backgrounds. */
-static void draw_frame(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
+static void draw_inset_border(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
 {
     static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* grey of sRGB 0.5, in linear light */
     const int frame = of->frame_width;
     for (int y = -frame; y < inset->height + frame; y++)
         for (int x = -frame; x < inset->width + frame; x++) {
             const bool is_inside = x >= 0 && x < inset->width && y >= 0 && y < inset->height;
-            if (!is_inside) memcpy(find_row(place, y) + 4 * x, grey, sizeof grey);
+            if (!is_inside) memcpy(get_row_address(place, y) + 4 * x, grey, sizeof grey);
         }
 }
 
@@ -263,15 +264,15 @@ static insitu_status draw_inset(const scene_montage *of, session_montage *m, sce
     const insitu_image picture = {
         .width = at->width, .height = at->height, .rgba = inset->rgba, .decorations = own ? &decorations : NULL};
     const insitu_status status = session_place_image(&picture, &place, error);
-    if (!status) draw_frame(of, &place, at);
+    if (!status) draw_inset_border(of, &place, at);
     return status;
 }
 
 /* Draws what must be drawn after the last picture of the step: decorations with shared bars, and insets. */
-static insitu_status finish_montage(const scene_montage *of, session_montage *m, base_error *error)
+static insitu_status draw_shared_decorations_and_insets(const scene_montage *of, session_montage *m, base_error *error)
 {
     const session_decorations *shared = of->shares_bars ? find_shared_bars(of, m) : NULL;
-    insitu_status status = of->shares_bars ? finish_panels(of, m, shared, error) : INSITU_OK;
+    insitu_status status = of->shares_bars ? decorate_all_panels(of, m, shared, error) : INSITU_OK;
     for (int i = 0; i < SCENE_ANCHORS && !status; i++)
         if (m->insets[i].rgba) status = draw_inset(of, m, (scene_anchor)i, shared, error);
     return status;
@@ -289,7 +290,8 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
             .width = compute_montage_width(of), .height = compute_montage_height(of), .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
-        if (finish_montage(of, m, &reason) || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
+        if (draw_shared_decorations_and_insets(of, m, &reason) ||
+            session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
             base_fail(error, reason.status, "%.900s", reason.message);
         free_montage(m);
     }

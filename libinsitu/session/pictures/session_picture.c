@@ -20,7 +20,8 @@ float *session_reserve_picture(session_picture *picture, size_t bytes)
 }
 
 /* Copies the pixels. If the image has decorations, it was drawn without its background, which is added to the copy. */
-static void copy_pixels(const scene_image *image, const struct image *picture, size_t pixels, float *rgba)
+static void copy_pixels_over_background(const scene_image *image, const struct image *picture, size_t pixels,
+                                        float *rgba)
 {
     static const float none[4] = {0, 0, 0, 0};
     const float *behind = image->decorations.is_given ? image->background : none;
@@ -39,7 +40,7 @@ insitu_status session_keep_picture(session_kept_pictures *kept, const scene_imag
     if (!block)
         return base_fail(error, INSITU_ERROR_MEMORY, "image \"%s\": no memory to keep it: %lld bytes", image->name,
                          (long long)bytes);
-    copy_pixels(image, picture, pixels, block);
+    copy_pixels_over_background(image, picture, pixels, block);
     memcpy(block + 4 * pixels, picture->depth, pixels * sizeof(float));
     kept->items[kept->count++] =
         (insitu_picture){image->name, picture->width, picture->height, block, block + 4 * pixels};

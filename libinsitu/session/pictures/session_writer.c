@@ -38,7 +38,7 @@ static void wait_for_thread(session_writer *w)
     pthread_mutex_unlock(&w->mutex);
 }
 
-static void wait_for_all(void)
+static void wait_for_all_writers(void)
 {
     if (getpid() != process) return;
     pthread_mutex_lock(&all_mutex);
@@ -52,7 +52,7 @@ static void wait_for_all(void)
 static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
 {
     (void)comm, (void)key, (void)value, (void)state;
-    wait_for_all();
+    wait_for_all_writers();
     return MPI_SUCCESS;
 }
 
@@ -60,7 +60,7 @@ static void register_wait_at_process_end(void)
 {
     int key = MPI_KEYVAL_INVALID;
     process = getpid();
-    atexit(wait_for_all);
+    atexit(wait_for_all_writers);
     if (MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, wait_in_finalize, &key, NULL) == MPI_SUCCESS)
         MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
 }
@@ -89,7 +89,7 @@ static void remove_from_all_writers(session_writer *w)
 /* ---- reuse of the memory of pictures ----------------------------------------------------------------------------- */
 
 /* Returns the size in bytes of the unused blocks that are kept for future pictures. The caller must hold w->mutex. */
-static int64_t free_bytes(const session_writer *w)
+static int64_t count_kept_bytes(const session_writer *w)
 {
     int64_t bytes = 0;
     for (int i = 0; i < SESSION_FREE_PICTURES; i++) bytes += (int64_t)w->free_memory[i].bytes;
@@ -98,10 +98,10 @@ static int64_t free_bytes(const session_writer *w)
 
 /* Keeps the block *memory for future pictures, or frees it if enough blocks are kept. Blocks are kept because
  * allocating new pages takes as long as filling them. The caller must hold w->mutex. */
-static void keep_memory(session_writer *w, session_picture *memory)
+static void keep_or_free_memory(session_writer *w, session_picture *memory)
 {
     for (int i = 0; i < SESSION_FREE_PICTURES; i++)
-        if (!w->free_memory[i].pixels && free_bytes(w) + (int64_t)memory->bytes <= most_free_bytes) {
+        if (!w->free_memory[i].pixels && count_kept_bytes(w) + (int64_t)memory->bytes <= most_free_bytes) {
             w->free_memory[i] = *memory;
             *memory = (session_picture){0};
         }
@@ -142,7 +142,7 @@ session_picture session_writer_reserve(session_writer *w, size_t bytes)
 void session_writer_release(session_writer *w, session_picture *memory)
 {
     pthread_mutex_lock(&w->mutex);
-    keep_memory(w, memory);
+    keep_or_free_memory(w, memory);
     pthread_mutex_unlock(&w->mutex);
 }
 
@@ -156,7 +156,7 @@ void session_writer_drop_memory(session_writer *w)
 int64_t session_writer_count_bytes(session_writer *w, int *waiting)
 {
     pthread_mutex_lock(&w->mutex);
-    const int64_t bytes = w->queued_bytes + free_bytes(w);
+    const int64_t bytes = w->queued_bytes + count_kept_bytes(w);
     *waiting = w->queued_count;
     pthread_mutex_unlock(&w->mutex);
     return bytes;
@@ -177,15 +177,15 @@ static void append_files(session_files **first, session_files **last, session_fi
 }
 
 /* Moves the first element of the queue to the list of written files. The caller must hold w->mutex. */
-static void finish_first_files(session_writer *w)
+static void move_first_files_to_finished_list(session_writer *w)
 {
     session_files *files = w->first;
     w->first = files->next;
     w->queued_count -= files->has_picture;
     w->queued_bytes -= session_files_bytes(files);
-    keep_memory(w, &files->memory);
+    keep_or_free_memory(w, &files->memory);
     session_free_channels(&files->channels);
-    session_free_deep(&files->deep);
+    session_free_deep_image(&files->deep);
     append_files(&w->finished, &w->last_finished, files);
     pthread_cond_broadcast(&w->has_changed);
 }
@@ -200,9 +200,9 @@ static void *run_writer(void *of_writer)
         if (!w->first) break;
         pthread_mutex_unlock(&w->mutex);
         session_write_files(w->first);
-        if (w->written_count++ < FIRST_PICTURES) atexit(wait_for_all);
+        if (w->written_count++ < FIRST_PICTURES) atexit(wait_for_all_writers);
         pthread_mutex_lock(&w->mutex);
-        finish_first_files(w);
+        move_first_files_to_finished_list(w);
     }
     pthread_mutex_unlock(&w->mutex);
     return NULL;
@@ -223,7 +223,7 @@ bool session_writer_writes_after_step(const session_writer *w, const scene *scen
 static void start_thread(session_writer *w)
 {
     sigset_t all, before;
-    atexit(wait_for_all);
+    atexit(wait_for_all_writers);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     w->is_running = pthread_create(&w->thread, NULL, run_writer, w) == 0;
@@ -273,7 +273,7 @@ static void collect_files(session_writer *w, const session_files *files, session
     session_writer_record_error(w, files->moment.cycle, &files->error);
 }
 
-void session_writer_collect(session_writer *w, session_report *report)
+void session_writer_collect_results(session_writer *w, session_report *report)
 {
     static const session_warning warning = {WARNING_WRITER, NULL, NULL, 0};
     pthread_mutex_lock(&w->mutex);

@@ -71,7 +71,7 @@ void session_writer_queue(session_writer *writer, struct session_files *files, b
 
 /* Collects the results of the thread: adds the time that the thread has used to the report, and its errors to the
  * writer's `failure`. Local. */
-void session_writer_collect(session_writer *writer, session_report *report);
+void session_writer_collect_results(session_writer *writer, session_report *report);
 
 /* Returns the first error that no step has returned yet, with the number of further errors in its message, and clears
  * all of them. Local. */

@@ -54,7 +54,7 @@ static bool add_isovalue_intervals(session_scalar *scalar, const scene_isosurfac
 static bool add_visible_intervals(session_scalar *scalar, const scene_volume *layer)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    const int count = session_visible_intervals(layer, intervals);
+    const int count = session_find_visible_intervals(layer, intervals);
     /* If the colour range is computed from the data, it is not known yet, because it requires a reduction over all
      * ranks. The visible values are then unknown too, and all cells are kept as candidates. */
     if (!layer->colour_map.range.is_fixed) scalar->needs_all_cells = true;
@@ -94,7 +94,7 @@ static bool mark_data_of_outer_surface(session_mesh *mesh, const scene_surface *
 {
     session_scalar *scalar;
     if (!session_is_surface_on_mesh(layer, mesh)) return true;
-    if (!session_mark_outer(mesh, &layer->threshold)) return false;
+    if (!session_mark_outer_surface_needed(mesh, &layer->threshold)) return false;
     if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
@@ -144,7 +144,7 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
         }
         for (int i = 0; i < count && mesh->is_given; i++)
             if (images[i]->variant.view == 0 && !mark_data_of_image(mesh, images[i], extent)) return false;
-        session_drop_thresholds(mesh);
+        session_drop_unused_outer_surfaces(mesh);
     }
     return true;
 }

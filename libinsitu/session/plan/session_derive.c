@@ -44,7 +44,8 @@ typedef struct derive_work {
 
 /* Returns the catalogue's entry for the derived field on the mesh; NULL if the mesh does not have the field, or if the
  * field cannot be computed there because of an error (fault). */
-static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
+static const session_catalogue_field *find_derived_field_of_mesh(const derive_work *w,
+                                                                 const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
         if (mesh->fields[f].derived_index == w->derived_index && !mesh->fields[f].fault && !mesh->fault)
@@ -64,7 +65,7 @@ typedef struct part_visit {
 static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     part_visit visit = {{0}, 0, NULL, 0};
-    if (find_field(w, mesh)) visit.parts = session_find_parts(w->basis->meshes, mesh->name);
+    if (find_derived_field_of_mesh(w, mesh)) visit.parts = session_find_parts(w->basis->meshes, mesh->name);
     return visit;
 }
 
@@ -89,7 +90,8 @@ static int find_input_component(const scene_field *input, int component_count)
 /* Returns whether the input's cell values on the mesh must first be converted to vertex values (recentred). */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
-    const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find_field(mesh, input->name);
+    const session_catalogue_field *field = find_derived_field_of_mesh(w, mesh),
+                                  *from = session_catalogue_find_field(mesh, input->name);
     return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
 }
 
@@ -106,7 +108,7 @@ static bool add_recentred_scalar_to_part(const session_catalogue_mesh *mesh, ses
 {
     const int index = part->is_given ? session_find_field(part, input->name) : -1;
     const uint64_t mesh_group = find_mesh_group_name(mesh, input);
-    if (index < 0 || session_find_recentred(part, input->name, component, mesh_group)) return true;
+    if (index < 0 || session_find_recentred_scalar(part, input->name, component, mesh_group)) return true;
     session_scalar *scalar = session_add_scalar(part);
     if (!scalar) return false;
     scalar->field = index;
@@ -126,7 +128,7 @@ static bool add_recentred_scalar(const derive_work *w, const session_catalogue_m
     return true;
 }
 
-static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
+static bool plan_recentring_of_input(derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     if (!is_recentred(w, mesh, input)) return true;
     const int count = session_catalogue_find_field(mesh, input->name)->component_count;
@@ -147,7 +149,7 @@ static bool list_recentrings(derive_work *w)
     const session_catalogue *catalogue = w->basis->catalogue;
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int k = 0; k < w->derived->input_count; k++)
-            if (!recentre_input(w, &catalogue->meshes[m], &w->derived->inputs[k])) return false;
+            if (!plan_recentring_of_input(w, &catalogue->meshes[m], &w->derived->inputs[k])) return false;
     const int most = w->recentring_count > catalogue->mesh_count ? w->recentring_count : catalogue->mesh_count;
     w->stale = base_calloc((size_t)most + 1, sizeof *w->stale);
     return w->stale != NULL;
@@ -159,12 +161,14 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                                       const session_mesh *part, int input, int component)
 {
     const scene_field *of = &w->derived->inputs[input];
-    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, find_mesh_group_name(mesh, of))
-                                     : NULL;
+    return is_recentred(w, mesh, of)
+               ? session_find_recentred_scalar(part, of->name, component, find_mesh_group_name(mesh, of))
+               : NULL;
 }
 
 /* Returns a hash of all data that determine the derived values on one of this rank's parts. */
-static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part)
+static uint64_t hash_versions_of_inputs(const derive_work *w, const session_catalogue_mesh *mesh,
+                                        const session_mesh *part)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     session_hash_bytes(&hash, &part->cells_stamp, sizeof part->cells_stamp);
@@ -192,7 +196,7 @@ static insitu_status find_stale_meshes(derive_work *w, base_error *error)
     for (int m = 0; m < count; m++) {
         w->stale[m] = 0;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v);)
-            if (v.part->fields[v.field_index].inputs_hash != hash_sources(w, &catalogue->meshes[m], v.part))
+            if (v.part->fields[v.field_index].inputs_hash != hash_versions_of_inputs(w, &catalogue->meshes[m], v.part))
                 w->stale[m] = 1;
     }
     w->stale[count] = error->status != INSITU_OK;
@@ -215,7 +219,7 @@ static grid_field find_input_values(const derive_work *w, const session_catalogu
     return session_get_caller_values(part, session_find_field(part, w->derived->inputs[input].name), component);
 }
 
-static bool is_wide_input(const session_mesh *part, const scene_field *input)
+static bool is_input_in_double(const session_mesh *part, const scene_field *input)
 {
     const int index = session_find_field(part, input->name);
     return index >= 0 && part->fields[index].values.is_wide;
@@ -228,10 +232,11 @@ static int64_t count_values(const session_mesh *part, const session_field *field
 
 /* Allocates memory for the derived values of a field on one part of a mesh, unless the field already has memory of the
  * right size. */
-static bool allocate_values(const derive_work *w, session_mesh *part, session_field *field)
+static bool allocate_derived_values(const derive_work *w, session_mesh *part, session_field *field)
 {
     bool is_wide = false;
-    for (int k = 0; k < w->derived->input_count; k++) is_wide = is_wide || is_wide_input(part, &w->derived->inputs[k]);
+    for (int k = 0; k < w->derived->input_count; k++)
+        is_wide = is_wide || is_input_in_double(part, &w->derived->inputs[k]);
     const int64_t size = is_wide ? 8 : 4;
     const int64_t bytes = count_values(part, field) * field->given.component_count * size;
     if (!field->copy || field->copy_bytes != bytes) {
@@ -246,7 +251,7 @@ static bool allocate_values(const derive_work *w, session_mesh *part, session_fi
     return true;
 }
 
-static void store_values(const session_field *field, int64_t tuple, const double *values)
+static void store_tuple(const session_field *field, int64_t tuple, const double *values)
 {
     const int count = field->given.component_count;
     for (int c = 0; c < count; c++)
@@ -257,10 +262,11 @@ static void store_values(const session_field *field, int64_t tuple, const double
 }
 
 /* Records that the derived values have changed, so that scalars and fields that depend on them are computed again. */
-static void mark_values_new(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
+static void mark_derived_values_changed(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part,
+                                        int index)
 {
     session_mark_scalars_stale(part, index);
-    part->fields[index].inputs_hash = hash_sources(w, mesh, part);
+    part->fields[index].inputs_hash = hash_versions_of_inputs(w, mesh, part);
     part->fields[index].is_copy_stale = false;
     for (int i = 0; i < part->scalar_count; i++)
         if (part->scalars[i].field == index)
@@ -330,7 +336,7 @@ static void evaluate_expression_in_blocks(const scene_derived *derived, const gr
             for (int k = 0; k < derived->input_count; k++)
                 load_block(&inputs[k], first, size, buffer->values + k * SCENE_BLOCK);
             scene_evaluate(&derived->expression, buffer->inputs, size, stack);
-            for (int i = 0; i < size; i++) store_values(field, first + i, stack + i);
+            for (int i = 0; i < size; i++) store_tuple(field, first + i, stack + i);
         }
         region_leave();
     }
@@ -344,7 +350,7 @@ static bool compute_expression_on_part(const derive_work *w, const session_catal
     block_buffer *buffers = NULL;
     grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
     const bool is_done =
-        inputs && block_buffers_create(w->derived, threads, &buffers) && allocate_values(w, part, field);
+        inputs && block_buffers_create(w->derived, threads, &buffers) && allocate_derived_values(w, part, field);
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
         const scene_field *input = &w->derived->inputs[k];
         const int count = part->fields[session_find_field(part, input->name)].given.component_count;
@@ -353,7 +359,7 @@ static bool compute_expression_on_part(const derive_work *w, const session_catal
     if (is_done) evaluate_expression_in_blocks(w->derived, inputs, buffers, field, count_values(part, field), threads);
     block_buffers_free(buffers, threads);
     base_free(inputs);
-    if (is_done) mark_values_new(w, mesh, part, index);
+    if (is_done) mark_derived_values_changed(w, mesh, part, index);
     return is_done;
 }
 
@@ -383,7 +389,7 @@ static int select_component(int component, const double vector[3], double *out)
 }
 
 /* Computes the derived values at a vertex. gradient[c]: gradient, at this vertex, of the scalar c in the list of
- * list_scalars(). */
+ * list_scalars_with_gradients(). */
 static void compute_values_from_gradient(const scene_derived *derived, const double gradient[SPACE][SPACE],
                                          double out[SPACE])
 {
@@ -401,8 +407,8 @@ static void compute_values_from_gradient(const scene_derived *derived, const dou
     }
 }
 
-static void store_gradients(const derive_work *w, const session_vertex_sums *sums, const session_sum_part *part,
-                            const session_field *field)
+static void store_values_from_gradients(const derive_work *w, const session_vertex_sums *sums,
+                                        const session_sum_part *part, const session_field *field)
 {
     const int words = session_count_sum_words(sums->field_count);
 #pragma omp parallel num_threads(session_choose_loop_threads(w->basis->team->threads, part->mesh->cells.vertex_count))
@@ -416,7 +422,7 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
                                                &sums->bounds, sums->length, gradient);
                 compute_values_from_gradient(w->derived, (const double(*)[SPACE])gradient, values);
             }
-            store_values(field, v, values);
+            store_tuple(field, v, values);
         }
         region_leave();
     }
@@ -424,8 +430,8 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
 
 /* Lists the scalars whose gradients the derived field needs, and returns their number. The scalars are the 2 or 3
  * components of a vector field, or the inputs of the derived field if these are scalars. */
-static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
-                        grid_field out[SESSION_GRADIENTS])
+static int list_scalars_with_gradients(const derive_work *w, const session_catalogue_mesh *mesh,
+                                       const session_mesh *part, grid_field out[SESSION_GRADIENTS])
 {
     const scene_derived *derived = w->derived;
     const int first = session_find_field(part, derived->inputs[0].name);
@@ -444,21 +450,21 @@ static const session_catalogue_mesh *find_first_mesh_without_fault(const derive_
                                                                    const session_mesh_group *mesh_group)
 {
     int i = 0;
-    while (i < mesh_group->count && !find_field(w, mesh_group->meshes[i])) i++;
+    while (i < mesh_group->count && !find_derived_field_of_mesh(w, mesh_group->meshes[i])) i++;
     return i < mesh_group->count ? mesh_group->meshes[i] : NULL;
 }
 
 /* Returns the number of scalars whose gradients are computed. It is determined from the catalogue instead of this
  * rank's parts, because ranks that have no part of the meshes need it as well. */
-static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
+static int count_scalars_with_gradients(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_uses_gradient_of_vector_field(w->derived)) return w->derived->input_count;
     return session_catalogue_find_field(find_first_mesh_without_fault(w, mesh_group), w->derived->inputs[0].name)
         ->component_count;
 }
 
-static insitu_status begin_sums(const derive_work *w, const session_mesh_group *mesh_group, session_vertex_sums *sums,
-                                base_error *error)
+static insitu_status prepare_sums_of_gradients(const derive_work *w, const session_mesh_group *mesh_group,
+                                               session_vertex_sums *sums, base_error *error)
 {
     sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
     if (!sums->parts) return session_fail_for_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
@@ -467,8 +473,8 @@ static insitu_status begin_sums(const derive_work *w, const session_mesh_group *
             session_sum_part *part = &sums->parts[sums->part_count++];
             part->mesh = v.part;
             part->of_shells = mesh_group->meshes[m]->has_shells_alone;
-            list_scalars(w, mesh_group->meshes[m], v.part, part->fields);
-            if (!allocate_values(w, v.part, &v.part->fields[v.field_index]))
+            list_scalars_with_gradients(w, mesh_group->meshes[m], v.part, part->fields);
+            if (!allocate_derived_values(w, v.part, &v.part->fields[v.field_index]))
                 return session_fail_for_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
     return session_assign_keys_to_vertices(sums, error);
@@ -476,17 +482,18 @@ static insitu_status begin_sums(const derive_work *w, const session_mesh_group *
 
 /* Computes the derived field from gradients on all meshes of a group. Collective. An error of this rank after the last
  * communication is only stored in *error. */
-static insitu_status derive_mesh_group(const derive_work *w, const session_mesh_group *mesh_group, base_error *error)
+static insitu_status compute_field_on_mesh_group(const derive_work *w, const session_mesh_group *mesh_group,
+                                                 base_error *error)
 {
-    session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars(w, mesh_group)};
-    if (!error->status) begin_sums(w, mesh_group, &sums, error);
+    session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars_with_gradients(w, mesh_group)};
+    if (!error->status) prepare_sums_of_gradients(w, mesh_group, &sums, error);
     const insitu_status status =
         session_compute_vertex_sums(mesh_group->homes, w->basis->team, w->basis->extent, &sums, error);
     int at = 0;
     for (int m = 0; m < mesh_group->count && !status && !error->status; m++)
         for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
-            store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.field_index]);
-            mark_values_new(w, mesh_group->meshes[m], v.part, v.field_index);
+            store_values_from_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.field_index]);
+            mark_derived_values_changed(w, mesh_group->meshes[m], v.part, v.field_index);
         }
     session_vertex_sums_free(&sums);
     return status;
@@ -502,18 +509,18 @@ static bool is_mesh_group_stale(const derive_work *w, const session_mesh_group *
 }
 
 /* Computes the derived field from gradients on each group of meshes on which the field exists and is out of date. */
-static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
+static insitu_status compute_field_on_mesh_groups(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     insitu_status status = INSITU_OK;
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_mesh_group *mesh_group =
-            find_field(w, mesh)
+            find_derived_field_of_mesh(w, mesh)
                 ? session_find_mesh_group(catalogue, session_find_group_name_of_mesh(mesh, w->derived->mesh_group_name))
                 : NULL;
         if (mesh_group && find_first_mesh_without_fault(w, mesh_group) == mesh && is_mesh_group_stale(w, mesh_group))
-            status = derive_mesh_group(w, mesh_group, error);
+            status = compute_field_on_mesh_group(w, mesh_group, error);
     }
     return status;
 }
@@ -527,13 +534,13 @@ static insitu_status derive_field(derive_work *w, base_error *error)
     if (!list_recentrings(w)) session_fail_for_memory(error, 1000, "the plan of derived fields");
     insitu_status status = session_agree(b->team->comm, error);
     if (!status && (!is_expression || w->recentring_count))
-        status = session_update_homes(b->catalogue, b->meshes, b->extent->half_diagonal, b->team, error);
+        status = session_update_home_ranks(b->catalogue, b->meshes, b->extent->half_diagonal, b->team, error);
     if (!status) status = session_recentre(w->recentrings, w->recentring_count, w->stale, b->meshes, b->team, error);
     if (!status) status = find_stale_meshes(w, error);
     if (!status && is_expression)
         compute_expressions(w, error);
     else if (!status)
-        status = derive_mesh_groups(w, error);
+        status = compute_field_on_mesh_groups(w, error);
     return status ? status : session_agree(b->team->comm, error);
 }
 
@@ -544,7 +551,7 @@ insitu_status session_compute_derived(const session_derive_basis *basis, uint64_
         if (!(needed >> i & 1)) continue;
         derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .derived_index = i};
         status = derive_field(&work, error);
-        session_share_derived_values(basis->meshes, work.derived->name);
+        session_lend_derived_values_to_mirrors(basis->meshes, work.derived->name);
         base_free(work.recentrings);
         base_free(work.stale);
     }

@@ -21,7 +21,7 @@ static uint64_t find_derived_field_bit(const scene *scene, const scene_field *fi
 
 /* Adds to the set of needed derived fields all derived fields on which they depend. A derived field depends only on
  * those before it in the scene's list. */
-static uint64_t add_source_bits(const scene *scene, uint64_t needed)
+static uint64_t add_required_field_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
         for (int k = 0; k < scene->derived[i].input_count && needed >> i & 1; k++)
@@ -44,7 +44,7 @@ uint64_t session_find_derived_fields_of_plan(const scene *scene, const session_p
     uint64_t bits = 0;
     for (int i = 0; i < plan->image_count && scene->derived_count; i++)
         if (plan->images[i]->variant.view == 0) bits |= find_derived_fields_of_image(scene, plan->images[i]);
-    return add_source_bits(scene, bits);
+    return add_required_field_bits(scene, bits);
 }
 
 uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle, bool images)
@@ -56,7 +56,7 @@ uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle
     for (int i = 0; i < scene->image_count && images; i++)
         if (scene->images[i].condition.is_given)
             bits |= find_derived_field_bit(scene, &scene->images[i].condition.field);
-    return add_source_bits(scene, bits);
+    return add_required_field_bits(scene, bits);
 }
 
 void session_mark_source_fields(const scene *scene, uint64_t needed, const session_meshes *meshes)
@@ -105,8 +105,8 @@ static insitu_status fail_for_component_count(const derived_on_mesh *at, const s
 
 /* Checks that an input that is a vector has the same number of components on at->mesh as on the meshes before it in the
  * catalogue. */
-static insitu_status check_other_meshes(const derived_on_mesh *at, const scene_field *input,
-                                        const session_catalogue_field *found, base_error *error)
+static insitu_status check_equal_components_on_meshes(const derived_on_mesh *at, const scene_field *input,
+                                                      const session_catalogue_field *found, base_error *error)
 {
     for (const session_catalogue_mesh *other = at->first_mesh; other < at->mesh; other++) {
         const session_catalogue_field *there = session_catalogue_find_field(other, input->name);
@@ -124,7 +124,7 @@ static insitu_status check_components(const derived_on_mesh *at, const scene_fie
 {
     const int count = found->component_count;
     if (session_uses_gradient_of_vector_field(at->derived)) {
-        if (count == 2 || count == 3) return check_other_meshes(at, input, found, error);
+        if (count == 2 || count == 3) return check_equal_components_on_meshes(at, input, found, error);
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "field \"%s\" has %d component%s on mesh \"%s\", expected a vector of 2 or 3, or a list of "
                             "2 or 3 scalars, as [u, v, w]",
@@ -229,7 +229,7 @@ static bool has_current_derived_fields(const session_catalogue_mesh *all, const 
 static bool add_derived_to_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
 {
     if (has_current_derived_fields(all, mesh)) return true;
-    session_drop_derived(mesh);
+    session_drop_derived_fields(mesh);
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
         if (!is_derived_without_fault(field)) continue;

@@ -113,7 +113,7 @@ static void widen_range(double low, double high, field_range *range)
 
 /* Widens *range so that it contains the range of values that is stored in the root of the mesh's tree. The root's range
  * contains all values of the mesh that images can show. */
-static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
+static void widen_range_by_tree_root(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
     const mmbvh_ranges root = session_get_scalar_ranges(mesh, scalar);
@@ -122,24 +122,24 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
 
 /* Widens *range so that it contains the scalar's values in those cells of the mesh that belong to the set `kind`. The
  * minimum and maximum of these values are computed here unless they are known already. */
-static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
-                             field_range *range)
+static void widen_range_by_cell_values(const session_mesh *mesh, session_scalar *scalar, int threads,
+                                       session_extent_kind kind, field_range *range)
 {
     double low, high;
     session_find_scalar_extent(mesh, scalar, threads, kind, &low, &high);
     widen_range(low, high, range);
 }
 
-static void add_face_range(const session_mesh *mesh, const scene_surface *surface, field_range *range)
+static void mark_range_if_faces_exist(const session_mesh *mesh, const scene_surface *surface, field_range *range)
 {
     const session_outer *outer = scene_field_selects_mesh(&surface->meshes_field, mesh->name)
-                                     ? session_find_outer(mesh, &surface->threshold)
+                                     ? session_find_outer_surface(mesh, &surface->threshold)
                                      : NULL;
     if (outer && outer->face_count > 0) widen_range(0, 0, range);
 }
 
-static field_range find_own_range(const session_meshes *meshes, const planned_layer *layer, int threads,
-                                  bool of_all_cells)
+static field_range find_layer_range_on_rank(const session_meshes *meshes, const planned_layer *layer, int threads,
+                                            bool of_all_cells)
 {
     field_range range = no_range;
     for (int i = 0; i < meshes->count; i++) {
@@ -147,14 +147,14 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
         if (!mesh->is_given) continue;
         session_scalar *scalar = session_find_scalar(mesh, find_layer_field(layer));
         if (layer->surface && !of_all_cells)
-            add_face_range(mesh, layer->surface, &range);
+            mark_range_if_faces_exist(mesh, layer->surface, &range);
         else if (scalar && layer->isosurface && mesh->has_shells_alone)
             /* trees do not contain shells, so that the shells' values must be read */
-            add_extent_range(mesh, scalar, threads, SESSION_SEEN, &range);
+            widen_range_by_cell_values(mesh, scalar, threads, SESSION_SEEN, &range);
         else if (scalar && of_all_cells)
-            add_extent_range(mesh, scalar, threads, SESSION_SOLID, &range);
+            widen_range_by_cell_values(mesh, scalar, threads, SESSION_SOLID, &range);
         else if (scalar)
-            add_root_range(mesh, scalar, &range);
+            widen_range_by_tree_root(mesh, scalar, &range);
     }
     return range;
 }
@@ -182,7 +182,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     for (int i = 0; i < batch->count && !error->status; i++) {
         planned_layer *layer = &batch->layers[i];
         if (!of_all_cells || layer->is_unreported)
-            layer->range = find_own_range(meshes, layer, team->threads, of_all_cells);
+            layer->range = find_layer_range_on_rank(meshes, layer, team->threads, of_all_cells);
     }
     for (int i = 0; i < batch->count; i++) {
         lows[2 * i] = batch->layers[i].range.low;
@@ -202,7 +202,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 /* Returns the identity of the layer's warning. isovalue_index: index of the isovalue in the layer; 0 for other layers.
  * In a sweep over isovalues each layer has one isovalue; the warning's number then contains the isovalue's index in the
  * scene file's list (list_isosurfaces()). */
-static session_warning make_warning(const planned_layer *layer, int isovalue_index)
+static session_warning make_layer_warning(const planned_layer *layer, int isovalue_index)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
                                       : layer->volume   ? WARNING_TRANSPARENT
@@ -212,15 +212,15 @@ static session_warning make_warning(const planned_layer *layer, int isovalue_ind
 
 /* Returns whether no cell crosses an isovalue. A crossing belongs to the cell whose values reach the isovalue from
  * below, so that no cell crosses an isovalue that equals the minimum of all values. */
-static bool is_outside(double value, const field_range *range)
+static bool is_isovalue_outside_range(double value, const field_range *range)
 {
     return value <= range->low || value > -range->negated_high;
 }
 
-static bool is_transparent(const scene_volume *volume, const field_range *range)
+static bool is_volume_transparent(const scene_volume *volume, const field_range *range)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    const int count = session_visible_intervals(volume, intervals);
+    const int count = session_find_visible_intervals(volume, intervals);
     for (int i = 0; i < count; i++)
         if ((double)intervals[i].high >= range->low && (double)intervals[i].low <= -range->negated_high) return false;
     return true;
@@ -243,11 +243,11 @@ static int count_values(const planned_layer *layer)
  * tested. */
 static bool is_layer_empty(const planned_layer *layer, int isovalue_index, const field_range *range)
 {
-    if (layer->isosurface) return is_outside(layer->isosurface->values[isovalue_index], range);
-    return layer->volume ? is_transparent(layer->volume, range) : layer->is_empty;
+    if (layer->isosurface) return is_isovalue_outside_range(layer->isosurface->values[isovalue_index], range);
+    return layer->volume ? is_volume_transparent(layer->volume, range) : layer->is_empty;
 }
 
-static bool find_new_warnings(const session_report *report, layer_batch *batch)
+static bool find_unreported_layers(const session_report *report, layer_batch *batch)
 {
     bool is_any = false;
     for (int i = 0; i < batch->count; i++) {
@@ -255,7 +255,7 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
         layer->is_empty = layer->range.low > -layer->range.negated_high;
         layer->range = raise_tree_minimum(&layer->range);
         for (int v = 0; v < count_values(layer); v++) {
-            const session_warning warning = make_warning(layer, v);
+            const session_warning warning = make_layer_warning(layer, v);
             if (is_layer_empty(layer, v, &layer->range) && !session_has_reported_warning(report, &warning))
                 layer->is_unreported = true;
         }
@@ -268,7 +268,7 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
 
 static void warn_of_empty_isosurface(session_report *report, const planned_layer *layer, int isovalue_index, bool holds)
 {
-    const session_warning warning = make_warning(layer, isovalue_index);
+    const session_warning warning = make_layer_warning(layer, isovalue_index);
     const double low = layer->range.low, high = -layer->range.negated_high,
                  at = layer->isosurface->values[isovalue_index];
     session_warn(report, &warning, holds,
@@ -279,7 +279,7 @@ static void warn_of_empty_isosurface(session_report *report, const planned_layer
 
 static void warn_of_empty_volume(session_report *report, const planned_layer *layer, bool holds)
 {
-    const session_warning warning = make_warning(layer, 0);
+    const session_warning warning = make_layer_warning(layer, 0);
     session_warn(report, &warning, holds,
                  "image \"%s\": the volume of \"%s\" shows nothing: the field goes from %g to %g, where its opacity is "
                  "0; check its range and opacity",
@@ -288,7 +288,7 @@ static void warn_of_empty_volume(session_report *report, const planned_layer *la
 
 static void warn_of_threshold(session_report *report, const planned_layer *layer, bool holds)
 {
-    const session_warning warning = make_warning(layer, 0);
+    const session_warning warning = make_layer_warning(layer, 0);
     const scene_threshold *threshold = &layer->surface->threshold;
     session_warn(report, &warning, holds,
                  "image \"%s\": a surface is empty: no cell is within its threshold, from %g to %g of \"%s\", which "
@@ -323,13 +323,13 @@ insitu_status session_warn_of_empty_layers(const session_plan *plan, const sessi
         layer_batch batch = {.first = first};
         if (count) list_layers(plan, &batch);
         status = reduce_ranges(meshes, team, &batch, false, &extras, error);
-        if (!status && find_new_warnings(report, &batch))
+        if (!status && find_unreported_layers(report, &batch))
             status = reduce_ranges(meshes, team, &batch, true, &extras, error);
         for (int i = 0; i < batch.count && !status; i++) warn_of_layer(report, &batch.layers[i]);
     }
     if (!status && extras.reporting_word)
-        status =
-            session_share_warnings(report, session_decode_rank_with_warnings(extras.reporting_word, team), team, error);
+        status = session_broadcast_warnings(report, session_decode_rank_with_warnings(extras.reporting_word, team),
+                                            team, error);
     if (!status && extras.has_other_cells)
         status = session_warn_of_unusable_cells(plan, catalogue, meshes, team, report, error);
     return status;

@@ -42,7 +42,7 @@ static session_mesh_group *add_mesh_group(session_catalogue *catalogue, uint64_t
     return mesh_groups[catalogue->mesh_group_count++] = mesh_group;
 }
 
-static bool add_single_group(session_catalogue *catalogue, session_catalogue_mesh *mesh)
+static bool add_group_of_one_mesh(session_catalogue *catalogue, session_catalogue_mesh *mesh)
 {
     if (session_find_mesh_group(catalogue, mesh->single_group_name)) return true;
     session_mesh_group *mesh_group = add_mesh_group(catalogue, mesh->single_group_name, 1);
@@ -65,7 +65,7 @@ static bool group_meshes(session_catalogue *catalogue, const group_purpose *purp
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
         if (!is_group_member(mesh, purpose)) continue;
         if (mesh->single_group_name) {
-            is_done = add_single_group(catalogue, mesh);
+            is_done = add_group_of_one_mesh(catalogue, mesh);
             continue;
         }
         session_hash_text(&hash, mesh->name);
@@ -100,7 +100,7 @@ static bool group_meshes_of_derived(session_catalogue *catalogue, scene *scene, 
 
 /* Computes the name of the group that each mesh with global ids forms by itself, and stores it in the mesh and its
  * parts. Also stores in each part whether any block of its mesh is refined. */
-static void add_single_groups(session_catalogue *catalogue, const session_meshes *meshes)
+static void name_groups_of_single_meshes(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
@@ -139,7 +139,7 @@ void session_group_meshes(scene *scene, session_catalogue *catalogue, session_me
     bool is_done = true;
     if (catalogue->are_meshes_grouped) return;
     session_drop_mesh_groups(catalogue);
-    add_single_groups(catalogue, meshes);
+    name_groups_of_single_meshes(catalogue, meshes);
     for (int i = 0; i < scene->image_count && is_done; i++)
         if (scene->images[i].variant.view == 0) is_done = group_meshes_of_image(catalogue, &scene->images[i]);
     for (int i = 0; i < scene->derived_count && is_done; i++) is_done = group_meshes_of_derived(catalogue, scene, i);

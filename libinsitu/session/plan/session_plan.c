@@ -24,7 +24,7 @@
 enum { NAMES_SIZE = 700 };
 
 /* Lists the names of the fields that exist, for a message. */
-static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZE])
+static void write_field_names(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;
     for (int m = 0; m < catalogue->mesh_count; m++) {
@@ -36,7 +36,7 @@ static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZ
     if (size == 0) snprintf(names, NAMES_SIZE, "none");
 }
 
-static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZE])
+static void write_mesh_names(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;
     for (int m = 0; m < catalogue->mesh_count && size < NAMES_SIZE; m++)
@@ -65,7 +65,7 @@ static const base_error *find_fault_of_drawn_mesh(const session_plan_basis *basi
     return NULL;
 }
 
-static bool is_on_any_mesh(const session_catalogue *catalogue, const char *name)
+static bool is_field_on_any_mesh(const session_catalogue *catalogue, const char *name)
 {
     for (int m = 0; m < catalogue->mesh_count; m++)
         if (session_catalogue_find_field(&catalogue->meshes[m], name)) return true;
@@ -87,7 +87,8 @@ static void write_suggestion(const session_catalogue *catalogue, const char *nam
 
 /* Stores the error that a derived field exists on no mesh, and names the input that no mesh has. Returns the error's
  * status; INSITU_OK if the field is not a derived one. */
-static insitu_status refuse_missing_input(const session_plan_basis *basis, const scene_field *field, base_error *error)
+static insitu_status fail_for_missing_input(const session_plan_basis *basis, const scene_field *field,
+                                            base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
     const int number = scene_find_derived(basis->scene, field->name);
@@ -95,27 +96,28 @@ static insitu_status refuse_missing_input(const session_plan_basis *basis, const
     if (!derived) return INSITU_OK;
     for (int k = 0; k < derived->input_count; k++) {
         const scene_field *input = &derived->inputs[k];
-        if (is_on_any_mesh(basis->catalogue, input->name)) continue;
-        if (copy_fault(find_fault_of_drawn_mesh(basis, input), error) || refuse_missing_input(basis, input, error))
+        if (is_field_on_any_mesh(basis->catalogue, input->name)) continue;
+        if (copy_fault(find_fault_of_drawn_mesh(basis, input), error) || fail_for_missing_input(basis, input, error))
             return error->status;
-        list_fields(basis->catalogue, names);
+        write_field_names(basis->catalogue, names);
         write_suggestion(basis->catalogue, input->name, meant);
         return base_fail(error, INSITU_ERROR_FIELD,
                          "%s:%d: fields.%s: no mesh has the field \"%s\"%s, of which it is made; there are: %s",
                          basis->scene_path, derived->line, derived->name, input->name, meant, names);
     }
-    list_fields(basis->catalogue, names);
+    write_field_names(basis->catalogue, names);
     return base_fail(error, INSITU_ERROR_FIELD,
                      "%s:%d: fields.%s: no mesh has all the fields that it is made of; there are: %s",
                      basis->scene_path, derived->line, derived->name, names);
 }
 
-static insitu_status refuse_missing_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
+static insitu_status fail_for_missing_field(const session_plan_basis *basis, const scene_field *field,
+                                            base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
     if (copy_fault(find_fault_of_drawn_mesh(basis, field), error)) return error->status;
-    if (refuse_missing_input(basis, field, error)) return error->status;
-    list_fields(basis->catalogue, names);
+    if (fail_for_missing_input(basis, field, error)) return error->status;
+    write_field_names(basis->catalogue, names);
     write_suggestion(basis->catalogue, field->name, meant);
     return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"%s; there are: %s",
                      basis->scene_path, field->line, field->name, meant, names);
@@ -138,11 +140,11 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
     }
     if (is_drawable) return INSITU_OK;
     if (is_there) {
-        list_fields(basis->catalogue, names);
+        write_field_names(basis->catalogue, names);
         return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: mesh \"%s\" does not have the field \"%s\"; there are: %s",
                          basis->scene_path, field->meshes_line, name, field->name, names);
     }
-    list_meshes(basis->catalogue, names);
+    write_mesh_names(basis->catalogue, names);
     return base_fail(error, INSITU_ERROR_MESH, "%s:%d: there is no mesh \"%s\"; there are: %s", basis->scene_path,
                      field->meshes_line, name, names);
 }
@@ -189,7 +191,7 @@ static insitu_status check_field(const session_plan_basis *basis, const scene_fi
         is_there = is_there || session_catalogue_find_field(mesh, field->name);
         if (shown) status = check_field_on_mesh(basis, field, mesh, shown, error);
     }
-    return is_there || status ? status : refuse_missing_field(basis, field, error);
+    return is_there || status ? status : fail_for_missing_field(basis, field, error);
 }
 
 static insitu_status check_layer_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
@@ -223,8 +225,8 @@ static void warn_of_grey_isosurface(const session_catalogue *catalogue, const sc
 
 /* Checks the field of a layer's contour lines on the meshes on which the layer is drawn. on: the field whose list of
  * meshes selects these meshes. */
-static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
-                                 base_error *error)
+static insitu_status check_field_of_contour_lines(const session_plan_basis *basis, const scene_lines *lines,
+                                                  const scene_field *on, base_error *error)
 {
     return lines->is_given ? check_field(basis, &lines->field, on, error) : INSITU_OK;
 }
@@ -236,7 +238,7 @@ static insitu_status check_surface(const session_plan_basis *basis, const scene_
         status = check_named_mesh(basis, &layer->meshes_field, layer->meshes_field.meshes[i], error);
     if (!status && layer->threshold.is_given)
         status = check_field(basis, &layer->threshold.field, &layer->meshes_field, error);
-    if (!status) status = check_lines(basis, &layer->lines, &layer->meshes_field, error);
+    if (!status) status = check_field_of_contour_lines(basis, &layer->lines, &layer->meshes_field, error);
     return status || !layer->has_colour_by ? status
                                            : check_field(basis, &layer->colour_by, &layer->meshes_field, error);
 }
@@ -248,13 +250,14 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
         const scene_isosurface *layer = &image->isosurfaces[i];
         status = check_layer_field(basis, &layer->field, error);
         if (!status && layer->has_colour_by) status = check_field(basis, &layer->colour_by, &layer->field, error);
-        if (!status) status = check_lines(basis, &layer->lines, &layer->field, error);
+        if (!status) status = check_field_of_contour_lines(basis, &layer->lines, &layer->field, error);
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(basis, &image->volumes[i].field, error);
     for (int i = 0; i < image->slice_count && !status; i++) {
         status = check_layer_field(basis, &image->slices[i].field, error);
-        if (!status) status = check_lines(basis, &image->slices[i].lines, &image->slices[i].field, error);
+        if (!status)
+            status = check_field_of_contour_lines(basis, &image->slices[i].lines, &image->slices[i].field, error);
     }
     for (int i = 0; i < image->surface_count && !status; i++) status = check_surface(basis, &image->surfaces[i], error);
     return status;
@@ -298,7 +301,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* Returns how many multiples of `interval` are not larger than `time`. A multiple that exceeds `time` only by rounding
  * is counted too, because ten steps of 0.1 add up to slightly less than 1. */
-static double count_intervals(double time, double interval)
+static double count_elapsed_intervals(double time, double interval)
 {
     const double count = time / interval;
     return floor(count + 1e-9 * fmax(1, fabs(count)));
@@ -307,8 +310,8 @@ static double count_intervals(double time, double interval)
 bool session_is_image_due(const scene_image *image, const session_moment *m)
 {
     if (image->time_interval > 0)
-        return m->is_first ||
-               count_intervals(m->time, image->time_interval) != count_intervals(m->last_time, image->time_interval);
+        return m->is_first || count_elapsed_intervals(m->time, image->time_interval) !=
+                                  count_elapsed_intervals(m->last_time, image->time_interval);
     return image->cycle_interval <= 1 || m->cycle % image->cycle_interval == 0;
 }
 
@@ -365,8 +368,8 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
 /* Warns of meshes on which a layer is drawn but which lack the field of the layer's contour lines. on: the field of
  * which the layer is made; it selects the meshes on which the layer is drawn. An outer surface is made of no field:
  * on->name is then NULL, and only on->meshes selects meshes. */
-static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
-                             const scene_lines *lines, session_report *report)
+static void warn_of_missing_contour_lines(const session_catalogue *catalogue, const scene_image *image,
+                                          const scene_field *on, const scene_lines *lines, session_report *report)
 {
     for (int m = 0; m < catalogue->mesh_count && lines->is_given && !lines->is_of_colours; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
@@ -439,11 +442,13 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
     for (int i = 0; i < image->isosurface_count; i++)
-        warn_of_no_lines(catalogue, image, &image->isosurfaces[i].field, &image->isosurfaces[i].lines, report);
+        warn_of_missing_contour_lines(catalogue, image, &image->isosurfaces[i].field, &image->isosurfaces[i].lines,
+                                      report);
     for (int i = 0; i < image->surface_count; i++)
-        warn_of_no_lines(catalogue, image, &image->surfaces[i].meshes_field, &image->surfaces[i].lines, report);
+        warn_of_missing_contour_lines(catalogue, image, &image->surfaces[i].meshes_field, &image->surfaces[i].lines,
+                                      report);
     for (int i = 0; i < image->slice_count; i++)
-        warn_of_no_lines(catalogue, image, &image->slices[i].field, &image->slices[i].lines, report);
+        warn_of_missing_contour_lines(catalogue, image, &image->slices[i].field, &image->slices[i].lines, report);
 }
 
 static bool check_image_and_warn(const session_plan_basis *basis, const scene_image *image, session_report *report,

@@ -33,7 +33,7 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, of->field) : NULL;
-        if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
+        if (scalar && of->plane) scalar = session_find_distance_scalar(mesh, of->plane);
         if (!scalar) continue;
         double least, most;
         session_find_scalar_extent(mesh, scalar, team->threads, of->is_positive ? SESSION_POSITIVE : SESSION_SEEN,
@@ -77,7 +77,7 @@ static int compute_digit_shift(int pass)
 }
 
 /* Returns a mask of the leading bits of a value that the passes before this one have determined. */
-static uint64_t known_bits_mask(int pass)
+static uint64_t make_mask_of_known_bits(int pass)
 {
     return pass ? ~UINT64_C(0) << compute_digit_shift(pass - 1) : 0;
 }
@@ -109,7 +109,7 @@ typedef struct digit_count {
     kept_values kept;
 } digit_count;
 
-static void keep_value(const weighted_value *value, kept_values *kept)
+static void store_value_for_later_passes(const weighted_value *value, kept_values *kept)
 {
     int at;
 #pragma omp atomic read
@@ -125,7 +125,7 @@ static void keep_value(const weighted_value *value, kept_values *kept)
  * any count. */
 static bool add_weight_of_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
 {
-    const uint64_t known = known_bits_mask(of->pass);
+    const uint64_t known = make_mask_of_known_bits(of->pass);
     bool is_counted = false;
     for (int end = 0; end < 2; end++) {
         if ((value->order & known) != of->known_bits[end]) continue;
@@ -180,13 +180,13 @@ static bool find_mean_of_extremes(const digit_count *of, const counted_cells *ce
     return range.is_finite && (!of->is_positive || *middle > 0);
 }
 
-static int64_t find_weight(const digit_count *of, const counted_cells *cells, int64_t cell)
+static int64_t compute_cell_weight(const digit_count *of, const counted_cells *cells, int64_t cell)
 {
     if (!of->is_of_shells) return 1;
     return of->largest_area > 0 ? llrint(find_shell_area(cells, cell) / of->largest_area * 0x1p28) : 0;
 }
 
-static void count_cells(const counted_cells *cells, int threads, digit_count *of, int64_t counts[2 * DIGITS])
+static void count_digits_of_cells(const counted_cells *cells, int threads, digit_count *of, int64_t counts[2 * DIGITS])
 {
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, cells->count))
     {
@@ -195,8 +195,9 @@ static void count_cells(const counted_cells *cells, int threads, digit_count *of
         for (int64_t cell = 0; cell < cells->count; cell++) {
             double middle;
             if (is_shell(cells, cell) != of->is_of_shells || !find_mean_of_extremes(of, cells, cell, &middle)) continue;
-            const weighted_value value = {map_value_to_ordered_integer(middle), find_weight(of, cells, cell)};
-            if (add_weight_of_value(of, &value, counts) && of->pass >= FIRST_KEPT) keep_value(&value, &of->kept);
+            const weighted_value value = {map_value_to_ordered_integer(middle), compute_cell_weight(of, cells, cell)};
+            if (add_weight_of_value(of, &value, counts) && of->pass >= FIRST_KEPT)
+                store_value_for_later_passes(&value, &of->kept);
         }
         region_leave();
     }
@@ -210,13 +211,14 @@ static void count_own_digits(const session_meshes *meshes, const session_team *t
     of->kept.count = 0;
     for (int i = 0; i < meshes->count; i++) {
         counted_cells cells;
-        if (find_cells(meshes, i, field, of, &cells)) count_cells(&cells, team->threads, of, counts);
+        if (find_cells(meshes, i, field, of, &cells)) count_digits_of_cells(&cells, team->threads, of, counts);
     }
     of->is_kept = of->pass >= FIRST_KEPT && of->kept.count <= MOST_KEPT;
 }
 
-static insitu_status count_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
-                                  digit_count *of, int64_t counts[2 * DIGITS], base_error *error)
+static insitu_status count_digits_over_ranks(const session_meshes *meshes, const session_team *team,
+                                             const scene_field *field, digit_count *of, int64_t counts[2 * DIGITS],
+                                             base_error *error)
 {
     memset(counts, 0, 2 * DIGITS * sizeof *counts);
     count_own_digits(meshes, team, field, of, counts);
@@ -250,8 +252,8 @@ static void find_own_kinds_of_cells(const counted_cells *cells, int threads, con
 /* Computes of->order_values: for each mesh with cells of higher order, the minimum and maximum of the values at the
  * nodes of each of the caller's cells, and the cells' volumes or areas. The nodes of quads are assumed to be
  * equispaced, because areas hardly depend on the spacing. Returns false if memory runs out. */
-static bool find_order_values(const session_meshes *meshes, int threads, const scene_field *field, digit_count *of,
-                              base_error *error)
+static bool find_higher_order_cell_values(const session_meshes *meshes, int threads, const scene_field *field,
+                                          digit_count *of, base_error *error)
 {
     of->order_values = base_calloc((size_t)meshes->count + 1, sizeof(session_cell_value *));
     if (!of->order_values) session_fail_for_memory(error, meshes->count, "percentiles");
@@ -262,14 +264,15 @@ static bool find_order_values(const session_meshes *meshes, int threads, const s
         const bool is_own = !scalar->is_recentred && !session_is_distance(scalar);
         const session_order_field own = {.mesh = mesh,
                                          .values = session_get_scalar_values(mesh, scalar),
-                                         .given = is_own ? session_find_caller_nodes(mesh, scalar->field) : -1,
+                                         .given =
+                                             is_own ? session_find_field_with_caller_nodes(mesh, scalar->field) : -1,
                                          .threads = threads};
-        session_find_order_values(&own, &of->order_values[i], error);
+        session_compute_higher_order_cell_values(&own, &of->order_values[i], error);
     }
     return !error->status;
 }
 
-static void free_order_values(const session_meshes *meshes, digit_count *of)
+static void free_higher_order_cell_values(const session_meshes *meshes, digit_count *of)
 {
     for (int i = 0; i < meshes->count && of->order_values; i++) base_free(of->order_values[i]);
     base_free(of->order_values);
@@ -280,7 +283,7 @@ static insitu_status choose_counted_cells(const session_meshes *meshes, const se
                                           const scene_field *field, digit_count *of, base_error *error)
 {
     double least[KINDS] = {0};
-    if (!find_order_values(meshes, team->threads, field, of, error)) least[LACKING] = -1;
+    if (!find_higher_order_cell_values(meshes, team->threads, field, of, error)) least[LACKING] = -1;
     for (int i = 0; i < meshes->count && least[LACKING] == 0; i++) {
         counted_cells cells;
         if (find_cells(meshes, i, field, of, &cells)) find_own_kinds_of_cells(&cells, team->threads, of, least);
@@ -320,7 +323,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
     digit_count of = {.is_positive = map->scale == SCENE_LOG};
     insitu_status status = choose_counted_cells(meshes, team, field, &of, error);
     for (of.pass = 0; of.pass < PASSES && !status; of.pass++) {
-        status = count_digits(meshes, team, field, &of, counts, error);
+        status = count_digits_over_ranks(meshes, team, field, &of, counts, error);
         for (int i = 0; i < DIGITS && of.pass == 0; i++) total += counts[i];
         for (int end = 0; end < 2; end++) {
             if (of.pass == 0) ranks[end] = find_position_of_percentile(percent[end], total);
@@ -328,7 +331,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
             of.known_bits[end] |= (uint64_t)digit << compute_digit_shift(of.pass);
         }
     }
-    free_order_values(meshes, &of);
+    free_higher_order_cell_values(meshes, &of);
     *low = total ? map_ordered_integer_to_value(of.known_bits[0]) : INFINITY;
     *high = total ? map_ordered_integer_to_value(of.known_bits[1]) : -INFINITY;
     return status;

@@ -159,7 +159,7 @@ static void append_group(cell_groups *list, int64_t group)
     list->groups[list->count++] = group;
 }
 
-static void add_group(cell_groups *list, int64_t group)
+static void append_group_if_new(cell_groups *list, int64_t group)
 {
     for (int64_t i = 0; i < list->count; i++)
         if (list->groups[i] == group) return;
@@ -183,7 +183,7 @@ static void drop_duplicate_groups(cell_groups *list)
 
 /* Adds a value to a group, unless the group has values of boundary faces. is_shared: other threads may add to the group
  * at the same time. */
-static inline void add_value(value_groups *values, int64_t group, double value, bool is_shared)
+static inline void add_value_to_group(value_groups *values, int64_t group, double value, bool is_shared)
 {
     int64_t at;
     if (values->has_face_values[group]) return;
@@ -208,13 +208,13 @@ static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *
     list->count = 0;
     while (grid_walk_next(&walk, &vertex)) {
         if (field->is_cell_centred) {
-            add_group(list, of_vertex[vertex]);
+            append_group_if_new(list, of_vertex[vertex]);
             continue;
         }
         value = grid_field_value(field, vertex);
-        if (isfinite(value)) add_value(&r->values, of_vertex[vertex], value, is_shared);
+        if (isfinite(value)) add_value_to_group(&r->values, of_vertex[vertex], value, is_shared);
     }
-    for (int64_t i = 0; i < list->count; i++) add_value(&r->values, list->groups[i], value, is_shared);
+    for (int64_t i = 0; i < list->count; i++) add_value_to_group(&r->values, list->groups[i], value, is_shared);
 }
 
 /* Adds the values of one of the caller's cells that is split into pieces. Vertices that pieces share are added once. */
@@ -236,7 +236,8 @@ static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_gr
     for (int64_t i = 0; i < list->count; i++) {
         const int64_t at = list->groups[i];
         if (!field->is_cell_centred) value = grid_field_value(field, at);
-        if (isfinite(value)) add_value(&r->values, field->is_cell_centred ? at : of_vertex[at], value, is_shared);
+        if (isfinite(value))
+            add_value_to_group(&r->values, field->is_cell_centred ? at : of_vertex[at], value, is_shared);
     }
 }
 
@@ -247,7 +248,7 @@ static void add_vertex_values(recentring *r, int part)
     const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
     for (int64_t v = 0; v < r->list.items[part]->cells.vertex_count; v++) {
         const double value = of_vertex[v] < 0 ? NAN : grid_field_value(field, v);
-        if (isfinite(value)) add_value(&r->values, of_vertex[v], value, false);
+        if (isfinite(value)) add_value_to_group(&r->values, of_vertex[v], value, false);
     }
 }
 
@@ -295,7 +296,7 @@ static void add_boundary_face_values(const session_patch_values *faces, value_gr
 }
 
 /* Lists this rank's parts of the meshes of a recentring. */
-static bool list_parts(const session_recentring *item, const session_meshes *meshes, recentring *r)
+static bool list_recentred_parts(const session_recentring *item, const session_meshes *meshes, recentring *r)
 {
     r->mesh_group = item->mesh_group;
     if (!session_list_mesh_group_parts(item->mesh_group, meshes, &r->list)) return false;
@@ -304,7 +305,7 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
     for (int i = 0; i < r->list.count; i++) {
         const session_mesh *mesh = r->list.items[i];
         mesh_part *part = &r->parts[i];
-        part->scalar = session_find_recentred(mesh, item->field, item->component, item->mesh_group->name);
+        part->scalar = session_find_recentred_scalar(mesh, item->field, item->component, item->mesh_group->name);
         if (!part->scalar) continue;
         part->field = session_get_caller_values(mesh, part->scalar->field, part->scalar->component);
         part->is_of_vertices = mesh->fields[part->scalar->field].given.centring == INSITU_VERTEX;
@@ -312,17 +313,17 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
     return true;
 }
 
-static bool update_groups(recentring *r, int ranks)
+static bool update_groups_of_equal_vertices(recentring *r, int ranks)
 {
     session_mesh_group *mesh_group = r->mesh_group;
-    const session_border *borders = session_has_twins(mesh_group) ? mesh_group->hanging.borders : NULL;
+    const session_border *borders = session_merges_close_vertices(mesh_group) ? mesh_group->hanging.borders : NULL;
     const session_vertex_groups_basis basis = {mesh_group->positions_hash, r->list.count,     r->list.items, borders,
                                                mesh_group->homes,          mesh_group->by_id, ranks};
     return session_update_vertex_groups(&basis, &mesh_group->groups);
 }
 
 /* Reads the values of boundary faces, one list per part. */
-static void find_face_values(const recentring *r, session_patch_values *faces, base_error *error)
+static void read_boundary_face_values(const recentring *r, session_patch_values *faces, base_error *error)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
     for (int i = 0; i < r->list.count && !error->status; i++) {
@@ -336,7 +337,7 @@ static void find_face_values(const recentring *r, session_patch_values *faces, b
 }
 
 /* Allocates memory for the values of cells and, if there are any, of faces. */
-static bool allocate_values(recentring *r, const session_patch_values *faces)
+static bool allocate_values_of_groups(recentring *r, const session_patch_values *faces)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
     int64_t count = 0, added = 0;
@@ -360,9 +361,9 @@ static void average_own_values(recentring *r, const session_team *team, base_err
 {
     const int count = r->list.count;
     session_patch_values *faces = base_calloc((size_t)count + 1, sizeof *faces);
-    bool is_done = faces && update_groups(r, team->ranks);
-    if (is_done) find_face_values(r, faces, error);
-    if (is_done && !error->status) is_done = allocate_values(r, faces);
+    bool is_done = faces && update_groups_of_equal_vertices(r, team->ranks);
+    if (is_done) read_boundary_face_values(r, faces, error);
+    if (is_done && !error->status) is_done = allocate_values_of_groups(r, faces);
     for (int i = 0; i < count && is_done && !error->status; i++)
         if (r->parts[i].scalar) is_done = add_part_values(r, i, team->threads);
     if (!is_done) session_fail_for_memory(error, r->mesh_group->groups.count * 100, "values recentred to vertices");
@@ -379,7 +380,7 @@ static void average_own_values(recentring *r, const session_team *team, base_err
 enum { RECORD_HEAD = 4 };
 #define FACE_VALUES (UINT64_C(1) << 63)
 
-static int64_t value_count(const value_groups *values, int64_t group)
+static int64_t count_values_of_group(const value_groups *values, int64_t group)
 {
     return values->ends[group] - values->starts[group];
 }
@@ -395,14 +396,14 @@ static bool pack_records(const recentring *r, int ranks, session_mail *mail)
     const int64_t *next = groups->shared_groups;
     for (int rank = 0; rank < ranks; rank++) {
         for (int64_t i = 0; i < groups->shared_counts[rank]; i++)
-            mail->counts[rank] += RECORD_HEAD + value_count(values, *next++);
+            mail->counts[rank] += RECORD_HEAD + count_values_of_group(values, *next++);
         mail->total += mail->counts[rank];
     }
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
     if (!mail->words) return false;
     uint64_t *record = mail->words;
     for (int64_t i = 0; i < groups->shared_count; i++) {
-        const int64_t group = groups->shared_groups[i], count = value_count(values, group);
+        const int64_t group = groups->shared_groups[i], count = count_values_of_group(values, group);
         memcpy(record, groups->shared_keys[i].words, sizeof groups->shared_keys[i].words);
         record[RECORD_HEAD - 1] = (uint64_t)count | (values->has_face_values[group] ? FACE_VALUES : 0);
         memcpy(record + RECORD_HEAD, values->values + values->starts[group], (size_t)count * sizeof(double));
@@ -432,7 +433,7 @@ static bool uses_record_values(const uint64_t *record, const value_groups *value
 
 /* Assigns each record to a group: groups[i] becomes the index, from 0, of the group of record i; records with equal
  * keys are in the same group. */
-static bool number_records(const session_mail *in, int64_t *groups, session_key_table *keys, int64_t records)
+static bool assign_records_to_groups(const session_mail *in, int64_t *groups, session_key_table *keys, int64_t records)
 {
     const uint64_t *end = in->words + in->total;
     if (!session_keys_create(keys, records)) return false;
@@ -479,7 +480,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     reply->words = base_alloc((size_t)reply->total * sizeof *reply->words);
     reply->counts = base_calloc((size_t)ranks, sizeof *reply->counts);
     const bool is_done = groups && starts && reply->words && reply->counts &&
-                         number_records(in, groups, &keys, reply->total) &&
+                         assign_records_to_groups(in, groups, &keys, reply->total) &&
                          gather_values_by_group(in, groups, keys.count, starts, &values);
     if (is_done) compute_group_means(&values, threads);
     for (int64_t i = 0; i < reply->total && is_done; i++)
@@ -542,7 +543,7 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
 /* Returns whether hanging vertices must get the values interpolated on the faces on which they lie. This is the case if
  * the field has cell or vertex values on some mesh. Corner values are not changed in this way, because codes with such
  * values interpolate them at hanging vertices themselves. */
-static bool needs_hanging_constraint(const session_recentring *item)
+static bool needs_hanging_interpolation(const session_recentring *item)
 {
     for (int i = 0; i < item->mesh_group->count; i++)
         if (session_catalogue_find_field(item->mesh_group->meshes[i], item->field)->centring != INSITU_CORNER)
@@ -550,7 +551,7 @@ static bool needs_hanging_constraint(const session_recentring *item)
     return false;
 }
 
-static insitu_status constrain_hanging(const recentring *r, const session_team *team, base_error *error)
+static insitu_status interpolate_hanging_values(const recentring *r, const session_team *team, base_error *error)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
     const session_hanging_basis basis = {r->mesh_group,          r->list.count,           r->list.items,
@@ -590,14 +591,14 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
 {
     recentring r = {0};
     insitu_status status = INSITU_OK;
-    const bool is_listed = list_parts(item, meshes, &r);
+    const bool is_listed = list_recentred_parts(item, meshes, &r);
     if (!is_listed) session_fail_for_memory(error, item->mesh_group->count * 64LL, "values recentred to vertices");
-    if (item->mesh_group->count > 1 || needs_hanging_constraint(item))
+    if (item->mesh_group->count > 1 || needs_hanging_interpolation(item))
         status = session_update_borders(item->mesh_group, &r.list, team, error);
     if (!status && is_listed) average_own_values(&r, team, error);
     if (!status && !error->status) allocate_recentred(&r, error);
     if (!status) status = team->ranks > 1 ? merge_shared_groups(team, &r, error) : session_agree(team->comm, error);
-    if (!status && needs_hanging_constraint(item)) status = constrain_hanging(&r, team, error);
+    if (!status && needs_hanging_interpolation(item)) status = interpolate_hanging_values(&r, team, error);
     if (!status && !error->status) store_means(&r, team->threads);
     groups_free(&r.values);
     base_free(r.starts);
@@ -606,13 +607,13 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
     return status;
 }
 
-static bool is_stale(const session_recentring *item, const session_meshes *meshes)
+static bool is_recentring_stale(const session_recentring *item, const session_meshes *meshes)
 {
     for (int m = 0; m < item->mesh_group->count; m++) {
         const session_parts parts = session_find_parts(meshes, item->mesh_group->meshes[m]->name);
         for (int i = 0; i < parts.count; i++) {
             const session_scalar *scalar =
-                session_find_recentred(parts.items[i], item->field, item->component, item->mesh_group->name);
+                session_find_recentred_scalar(parts.items[i], item->field, item->component, item->mesh_group->name);
             if (scalar && (scalar->are_values_stale || scalar->positions_hash != item->mesh_group->positions_hash))
                 return true;
         }
@@ -639,7 +640,7 @@ insitu_status session_recentre(const session_recentring *items, int count, int *
                                const session_team *team, base_error *error)
 {
     if (count == 0) return INSITU_OK;
-    for (int i = 0; i < count; i++) stale[i] = is_stale(&items[i], meshes);
+    for (int i = 0; i < count; i++) stale[i] = is_recentring_stale(&items[i], meshes);
     insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
     for (int i = 0; i < count && !status; i++)

@@ -17,34 +17,36 @@ typedef struct layer_list {
     session_run_range *items; /* the layers with ranges over the run; NULL: layers are only counted */
 } layer_list;
 
-static void add_layer(layer_list *list, const char *kind, int number, const scene_field *field,
-                      const scene_colour_map *map)
+static void append_layer_with_run_range(layer_list *list, const char *kind, int number, const scene_field *field,
+                                        const scene_colour_map *map)
 {
     if (map->range.is_fixed || map->range.source != SCENE_RANGE_RUN) return;
     if (list->items) list->items[list->count] = (session_run_range){kind, number, field, map, INFINITY, -INFINITY};
     list->count++;
 }
 
-static void list_layers(const scene_image *image, layer_list *list)
+static void list_layers_with_run_ranges(const scene_image *image, layer_list *list)
 {
     for (int i = 0; i < image->isosurface_count; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
-        if (layer->has_colour_by) add_layer(list, "isosurface", i, &layer->colour_by, &layer->colour_map);
+        if (layer->has_colour_by)
+            append_layer_with_run_range(list, "isosurface", i, &layer->colour_by, &layer->colour_map);
     }
     for (int i = 0; i < image->surface_count; i++) {
         const scene_surface *layer = &image->surfaces[i];
-        if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
+        if (layer->has_colour_by)
+            append_layer_with_run_range(list, "surface", i, &layer->colour_by, &layer->colour_map);
     }
     for (int i = 0; i < image->slice_count; i++)
-        add_layer(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
+        append_layer_with_run_range(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
     for (int i = 0; i < image->volume_count; i++)
-        add_layer(list, "volume", i, &image->volumes[i].field, &image->volumes[i].colour_map);
+        append_layer_with_run_range(list, "volume", i, &image->volumes[i].field, &image->volumes[i].colour_map);
 }
 
-static int count_layers(const scene_image *image)
+static int count_layers_with_run_ranges(const scene_image *image)
 {
     layer_list list = {0};
-    list_layers(image, &list);
+    list_layers_with_run_ranges(image, &list);
     return list.count;
 }
 
@@ -181,7 +183,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
  * have been read. */
 static bool append_empty_image_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
-    const int count = count_layers(image);
+    const int count = count_layers_with_run_ranges(image);
     session_image_ranges *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
     if (items) {
         all->items = items;
@@ -191,7 +193,7 @@ static bool append_empty_image_ranges(session_run_ranges *all, const scene_image
                                         .path = make_ranges_file_path(image),
                                         .count = count,
                                         .items = base_calloc((size_t)count, sizeof *entry->items)};
-        if (entry->items) list_layers(image, &(layer_list){0, entry->items});
+        if (entry->items) list_layers_with_run_ranges(image, &(layer_list){0, entry->items});
         if (entry->image && entry->path && entry->items) return true;
         free_ranges(entry);
     }
@@ -200,7 +202,7 @@ static bool append_empty_image_ranges(session_run_ranges *all, const scene_image
 }
 
 /* Sends the ranges that rank 0 has read to all ranks. Collective. */
-static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, base_error *error)
+static insitu_status broadcast_ranges(session_image_ranges *ranges, MPI_Comm comm, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int i = 0; i < ranges->count && !status; i++) {
@@ -217,14 +219,14 @@ static insitu_status load_ranges_on_all_ranks(session_image_ranges *ranges, cons
 {
     if (team->rank == 0) read_ranges(ranges, error);
     const insitu_status status = session_agree_without_rank(team->comm, error);
-    return status ? status : share_ranges(ranges, team->comm, error);
+    return status ? status : broadcast_ranges(ranges, team->comm, error);
 }
 
-insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
-                                      session_image_ranges **out, base_error *error)
+insitu_status session_find_or_read_run_ranges(session_run_ranges *all, const scene_image *image,
+                                              const session_team *team, session_image_ranges **out, base_error *error)
 {
     *out = find_ranges(all, image);
-    if (*out || count_layers(image) == 0) return INSITU_OK;
+    if (*out || count_layers_with_run_ranges(image) == 0) return INSITU_OK;
     const bool is_prepared = append_empty_image_ranges(all, image, error);
     session_image_ranges *ranges = is_prepared ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
@@ -236,7 +238,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
     return INSITU_OK;
 }
 
-static session_run_range *find_range(session_image_ranges *ranges, const scene_colour_map *map)
+static session_run_range *find_range_of_colour_map(session_image_ranges *ranges, const scene_colour_map *map)
 {
     for (int i = 0; ranges && i < ranges->count; i++)
         if (ranges->items[i].map == map) return &ranges->items[i];
@@ -245,7 +247,7 @@ static session_run_range *find_range(session_image_ranges *ranges, const scene_c
 
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high)
 {
-    session_run_range *range = find_range(ranges, map);
+    session_run_range *range = find_range_of_colour_map(ranges, map);
     if (!range) return;
     if (*low <= *high && (*low < range->low || *high > range->high)) {
         range->low = fmin(range->low, *low);

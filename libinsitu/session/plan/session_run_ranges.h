@@ -41,8 +41,8 @@ typedef struct session_run_ranges {
 
 /* Finds the image's ranges, or reads them from their file at the first call for the image. *out is NULL if no layer of
  * the image has a range that widens over the run. Collective. */
-insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
-                                      session_image_ranges **out, base_error *error);
+insitu_status session_find_or_read_run_ranges(session_run_ranges *all, const scene_image *image,
+                                              const session_team *team, session_image_ranges **out, base_error *error);
 
 /* Widens the range over the run of the layer that has this colour map by the range of this step. On entry, *low and
  * *high are the range of this step; on return, they are the widened range. Local. */

@@ -39,7 +39,7 @@ typedef struct smooth_work {
 
 /* ---- fields with smooth normals ------------------------------------------------------------------------------ */
 
-static smooth_item *find_item(smooth_items *items, const smooth_item *like)
+static smooth_item *find_or_add_field(smooth_items *items, const smooth_item *like)
 {
     for (int i = 0; i < items->count; i++) {
         smooth_item *item = &items->items[i];
@@ -75,7 +75,7 @@ bool session_has_curved_faces(const session_catalogue *catalogue)
 
 /* Adds the field of a layer with smooth normals to the list of fields that need gradients, if the layer is drawn on the
  * mesh. */
-static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
+static bool add_field_of_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
     const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
     if (!field || !scene_field_selects_mesh(&layer->field, mesh->name)) return true;
@@ -84,7 +84,7 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     const uint64_t mesh_group_name =
         is_recentred ? session_find_group_name_of_mesh(mesh, layer->field.mesh_group_name) : 0;
     smooth_item *item =
-        find_item(items, &(smooth_item){mesh, field, &layer->field, mesh_group_name, component, 0, NULL});
+        find_or_add_field(items, &(smooth_item){mesh, field, &layer->field, mesh_group_name, component, 0, NULL});
     if (!item) return false;
     const size_t count = (size_t)item->value_count + (size_t)layer->value_count;
     mmbvh_interval *values = base_realloc(item->values, count * sizeof *values);
@@ -107,7 +107,7 @@ static bool list_fields_with_smooth_normals(const session_plan *plan, const sess
             if (image->variant.view > 0) continue;
             for (int n = 0; n < image->isosurface_count && is_listed; n++)
                 is_listed = !session_has_smooth_normals(&image->isosurfaces[n], catalogue) ||
-                            add_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
+                            add_field_of_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
         }
     return is_listed;
 }
@@ -162,7 +162,8 @@ static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_s
     return true;
 }
 
-static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_work *work, base_error *error)
+static insitu_status find_keys_of_crossed_cells(const smooth_item *item, int threads, smooth_work *work,
+                                                base_error *error)
 {
     session_vertex_sums *sums = &work->sums;
     const mmbvh_options options = {.threads = threads};
@@ -183,8 +184,8 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
 }
 
 /* Allocates and fills this rank's data for a field that needs gradients. */
-static insitu_status create_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
-                                 base_error *error)
+static insitu_status create_gradient_work(const smooth_item *item, const session_meshes *meshes, int threads,
+                                          smooth_work *work, base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, item->mesh->name);
     const size_t capacity = (size_t)parts.count + 1;
@@ -203,10 +204,10 @@ static insitu_status create_work(const smooth_item *item, const session_meshes *
         sums->parts[sums->part_count].mesh = part;
         sums->parts[sums->part_count++].fields[0] = session_get_scalar_values(part, scalar);
     }
-    return find_own_keys(item, threads, work, error);
+    return find_keys_of_crossed_cells(item, threads, work, error);
 }
 
-static void free_work(smooth_work *work)
+static void free_gradient_work(smooth_work *work)
 {
     for (int i = 0; i < work->sums.part_count && work->crossed; i++) mmbvh_selection_free(&work->crossed[i]);
     base_free(work->crossed);
@@ -258,16 +259,17 @@ static bool store_gradients(const session_vertex_sums *sums, session_sum_part *p
     return true;
 }
 
-static insitu_status find_item_gradients(const smooth_item *item, const session_meshes *meshes,
-                                         const session_team *team, const session_extent *extent, base_error *error)
+static insitu_status compute_gradients_of_field(const smooth_item *item, const session_meshes *meshes,
+                                                const session_team *team, const session_extent *extent,
+                                                base_error *error)
 {
     smooth_work work = {0};
-    if (!error->status) create_work(item, meshes, team->threads, &work, error);
+    if (!error->status) create_gradient_work(item, meshes, team->threads, &work, error);
     const insitu_status status = session_compute_vertex_sums(&item->mesh->homes, team, extent, &work.sums, error);
     for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
         if (!store_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
             session_fail_for_memory(error, work.sums.own_count * 12, "gradients at vertices");
-    free_work(&work);
+    free_gradient_work(&work);
     return status;
 }
 
@@ -281,7 +283,7 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
         session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)
-        status = find_item_gradients(&items.items[i], meshes, team, extent, error);
+        status = compute_gradients_of_field(&items.items[i], meshes, team, extent, error);
     items_free(&items);
     return status;
 }

@@ -8,7 +8,7 @@
 /* Computes the gradients at the vertices of the cells that isosurfaces with smooth normals cross. Each gradient is
  * computed from the cells around the vertex on all ranks, and is bit-identical for any partition. Vertices are equal,
  * also on different ranks, if their keys are equal: their global ids or, without ids, the bits of their coordinates
- * (session_keys.h). extent: the global bounds. session_update_homes() must have been called, because session_homes
+ * (session_keys.h). extent: the global bounds. session_update_home_ranks() must have been called, because session_homes
  * contains the ranks near this rank, which may have cells at the same vertices. Collective. All ranks return the same
  * status. An error that occurs on this rank after the last communication is only stored in *error, and the next phase
  * passes it to all ranks. */

@@ -19,7 +19,7 @@ typedef struct surface_request {
 /* Returns the part's outer surface for the threshold of the request; NULL if the part has none. */
 static session_outer *find_outer_surface_of_part(const session_mesh *part, const surface_request *request)
 {
-    return part->is_given ? session_find_outer(part, request->threshold) : NULL;
+    return part->is_given ? session_find_outer_surface(part, request->threshold) : NULL;
 }
 
 /* Returns whether the outer faces of any of this rank's parts are out of date. */
@@ -28,7 +28,7 @@ static bool are_faces_stale(const session_meshes *meshes, const surface_request 
     const session_parts parts = session_find_parts(meshes, request->mesh->name);
     for (int i = 0; i < parts.count; i++) {
         const session_outer *outer = find_outer_surface_of_part(parts.items[i], request);
-        if (outer && session_is_outer_stale(parts.items[i], outer)) return true;
+        if (outer && session_are_outer_faces_stale(parts.items[i], outer)) return true;
     }
     return false;
 }
@@ -116,7 +116,8 @@ static insitu_status find_outer_faces_of_request(const session_meshes *meshes, c
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &request->mesh->homes, team, error);
     if (!status && !error->status) session_drop_faces_between_levels(meshes, of, count, error);
-    for (int i = 0; i < count && !status && !error->status; i++) session_mark_outer_fresh(of[i].mesh, of[i].outer);
+    for (int i = 0; i < count && !status && !error->status; i++)
+        session_mark_outer_faces_current(of[i].mesh, of[i].outer);
     base_free(of);
     return status ? status : session_agree(team->comm, error);
 }
@@ -134,7 +135,7 @@ static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer 
     return INSITU_OK;
 }
 
-static void make_meshes(const session_meshes *meshes, bool have_normals, base_error *error)
+static void make_needed_outer_meshes(const session_meshes *meshes, bool have_normals, base_error *error)
 {
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
@@ -160,6 +161,6 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
         if (stale[i]) status = find_outer_faces_of_request(meshes, &requests[i], team, error);
     base_free(stale);
     base_free(requests);
-    if (!status) make_meshes(meshes, session_has_curved_faces(catalogue), error);
+    if (!status) make_needed_outer_meshes(meshes, session_has_curved_faces(catalogue), error);
     return status;
 }

@@ -158,7 +158,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
     return true;
 }
 
-int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
+int session_find_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
 {
     const scene_range *range = &volume->colour_map.range;
     /* the members for bands and for colours outside the range are cleared below, because a map with a single colour

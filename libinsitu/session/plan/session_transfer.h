@@ -30,7 +30,7 @@ void session_transfer_free(session_transfer *transfer);
 /* Computes the intervals of values in which a volume is not transparent, and returns their number. If the colour map's
  * range is not fixed, it depends on the data; the result is then all values, or none if the volume's opacity is 0 at
  * all values. Local, the same on every rank. */
-int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
+int session_find_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
 /* Returns whether a range is so narrow that the colours of its values show rounding errors. This is the case if the
  * range's width is only a few dozen rounding errors of its values in double, or below the smallest normal float32. */

@@ -316,7 +316,7 @@ static bool has_new_values(const session_mesh *mesh)
 
 /* Returns whether there is a partial tree that is still valid, because the cells, their vertices, their values and the
  * queries that select visible cells (key) are unchanged. */
-static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
+static bool is_partial_tree_valid(const session_mesh *mesh, uint64_t key)
 {
     if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;
     return !has_new_values(mesh) && mesh->candidates_key == key;
@@ -326,7 +326,7 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
  * candidates (session_hash_candidate_queries()). */
 static insitu_status update_partial_tree(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
-    if (is_partial_fresh(mesh, key)) return INSITU_OK;
+    if (is_partial_tree_valid(mesh, key)) return INSITU_OK;
     const double start = omp_get_wtime();
     mmbvh_selection selection;
     insitu_status status = session_select_candidates(mesh, u->threads, &selection, error);
@@ -381,7 +381,7 @@ typedef struct thread_update {
 
 enum { PARTS_A_THREAD = 4 };
 
-static void merge_threads(const tree_update *u, const thread_update *each, base_error *error)
+static void merge_results_of_threads(const tree_update *u, const thread_update *each, base_error *error)
 {
     double build_ms = 0, refit_ms = 0;
     for (int t = 0; t < u->threads; t++) {
@@ -414,7 +414,7 @@ static insitu_status update_on_threads(const tree_update *u, session_mesh *const
             if (!own->error.status) update_tree(&own->update, parts[i], &own->error);
         region_leave();
     }
-    merge_threads(u, each, error);
+    merge_results_of_threads(u, each, error);
     base_free(each);
     return error->status;
 }

@@ -13,7 +13,7 @@ typedef struct field_walk {
     scene_field_walk fields;
 } field_walk;
 
-static const scene_field *next_field(field_walk *walk)
+static const scene_field *next_shown_field(field_walk *walk)
 {
     for (;;) {
         const scene_field *field = walk->fields.image ? scene_next_field(&walk->fields) : NULL;
@@ -25,17 +25,17 @@ static const scene_field *next_field(field_walk *walk)
     }
 }
 
-static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
+static int64_t count_unusable_cells(const session_mesh *mesh, const scene_field *field)
 {
     const session_scalar *scalar = mesh->is_given && !mesh->source ? session_find_scalar(mesh, field) : NULL;
     return scalar ? session_count_unusable_cells(mesh, scalar) : 0;
 }
 
-static int64_t count_unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
+static int64_t count_unusable_cells_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
 {
     const session_parts parts = session_find_parts(meshes, name);
     int64_t sum = 0;
-    for (int i = 0; i < parts.count; i++) sum += count_unusable(parts.items[i], field);
+    for (int i = 0; i < parts.count; i++) sum += count_unusable_cells(parts.items[i], field);
     return sum;
 }
 
@@ -43,7 +43,7 @@ uint64_t session_hash_unusable_fields(const session_plan *plan, const session_me
 {
     uint64_t key = 0;
     field_walk walk = {.plan = plan};
-    for (const scene_field *field; (field = next_field(&walk)) != NULL;)
+    for (const scene_field *field; (field = next_shown_field(&walk)) != NULL;)
         for (int m = 0; m < meshes->count; m++) {
             const session_mesh *mesh = meshes->items[m];
             const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
@@ -72,9 +72,9 @@ insitu_status session_warn_of_unusable_cells(const session_plan *plan, const ses
     if (!counts) session_fail_for_memory(error, (mesh_count + 1) * (int64_t)sizeof *counts, "counts of cells");
     insitu_status status = session_agree(team->comm, error);
     field_walk walk = {.plan = plan};
-    for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
+    for (const scene_field *field; !status && (field = next_shown_field(&walk)) != NULL;) {
         for (int m = 0; m < mesh_count; m++)
-            counts[m] = count_unusable_of_parts(meshes, catalogue->meshes[m].name, field);
+            counts[m] = count_unusable_cells_of_parts(meshes, catalogue->meshes[m].name, field);
         const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
         status = session_check_mpi(error, code, "MPI_Allreduce");
         for (int m = 0; m < mesh_count && !status; m++)

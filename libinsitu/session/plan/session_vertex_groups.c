@@ -85,7 +85,7 @@ static void find_vertex_position(const groups_basis *basis, const session_vertex
         else
             end = middle;
     }
-    grid_vertex(&basis->parts[part]->cells, number - groups->first_vertices[part], position);
+    grid_read_vertex_position(&basis->parts[part]->cells, number - groups->first_vertices[part], position);
 }
 
 static void find_group_position(const groups_basis *basis, const session_vertex_groups *groups,
@@ -107,8 +107,8 @@ static void find_home_ranks(const groups_basis *basis, const int64_t *one_vertex
         find_group_position(basis, out, one_vertex, group, position[0]);
         home[group] = -1;
         if (!session_is_in_other_box(basis->homes, position[0])) continue;
-        home[group] = session_find_home(basis->homes, (const double(*)[3])position, 1, session_key_hash(key),
-                                        (int64_t)key->words[0]);
+        home[group] = session_find_home_rank(basis->homes, (const double(*)[3])position, 1, session_key_hash(key),
+                                             (int64_t)key->words[0]);
         out->shared_counts[home[group]]++;
         out->shared_count++;
     }

@@ -23,7 +23,7 @@ enum { KEY_WORDS = 3 };
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
 /* Sets key_indices to 0 for vertices of cells that are not ghosts, and to -1 for all other vertices. */
-static void mark_vertices(session_sum_part *part)
+static void mark_vertices_of_drawn_cells(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
     for (int64_t v = 0; v < g->vertex_count; v++) part->key_indices[v] = -1;
@@ -48,7 +48,7 @@ static bool assign_keys_to_all_vertices(session_vertex_sums *sums)
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
-        mark_vertices(part);
+        mark_vertices_of_drawn_cells(part);
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             if (part->key_indices[v] < 0) continue;
             const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
@@ -110,7 +110,7 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
                 const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
                 number = session_keys_find(&sums->keys, &key);
             }
-            grid_vertex(&part->mesh->cells, v, (*out)[number]);
+            grid_read_vertex_position(&part->mesh->cells, v, (*out)[number]);
         }
     }
     return true;
@@ -118,8 +118,8 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
 
 /* For each other rank near this one, packs the keys whose vertices lie in the other rank's box into a message. *numbers
  * receives the index of each packed key, in the order of the messages. */
-static bool write_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
-                           const double (*positions)[3], session_mail *out, int64_t **numbers)
+static bool pack_key_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
+                              const double (*positions)[3], session_mail *out, int64_t **numbers)
 {
     int64_t total = 0, at = 0;
     out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
@@ -146,7 +146,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
 
 /* Enlarges the table of keys so that it has space for `more` keys requested by other ranks, which the caller adds after
  * this rank's own keys. */
-static bool extend_keys(session_vertex_sums *sums, int64_t more)
+static bool reserve_requested_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
     if (!session_keys_create(&all, sums->own_count + more)) return false;
@@ -159,11 +159,11 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
 /* Finds the index of each key that other ranks have requested, and adds the key if it is new. If has_all_vertices is
  * set, no keys are added, because every vertex has one already. *numbers receives the indices of the requested keys, in
  * the order of the messages; -1: this rank has no vertex with the key. */
-static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
+static bool add_requested_keys(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
     *numbers = base_alloc((size_t)(count ? count : 1) * sizeof **numbers);
-    if (!*numbers || (!sums->has_all_vertices && !extend_keys(sums, count))) return false;
+    if (!*numbers || (!sums->has_all_vertices && !reserve_requested_keys(sums, count))) return false;
     for (int64_t i = 0; i < count; i++) {
         session_key key;
         memcpy(key.words, in->words + i * KEY_WORDS, sizeof key.words);
@@ -176,18 +176,18 @@ static bool read_requests(const session_mail *in, session_vertex_sums *sums, int
 static insitu_status send_requests(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
                                    sums_messages *mail, base_error *error)
 {
-    if (!error->status &&
-        (!find_key_positions(sums, &mail->positions) ||
-         !write_requests(sums, team, homes, (const double(*)[3])mail->positions, &mail->requests, &mail->own_numbers)))
+    if (!error->status && (!find_key_positions(sums, &mail->positions) ||
+                           !pack_key_requests(sums, team, homes, (const double(*)[3])mail->positions, &mail->requests,
+                                              &mail->own_numbers)))
         session_fail_for_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
     const insitu_status status =
         session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->requests, &mail->received_requests, error);
-    if (!status && !error->status && !read_requests(&mail->received_requests, sums, &mail->requested_numbers))
+    if (!status && !error->status && !add_requested_keys(&mail->received_requests, sums, &mail->requested_numbers))
         session_fail_for_memory(error, mail->received_requests.total * 24, "gradients at vertices that ranks share");
     return status;
 }
 
-static bool write_answers(const session_vertex_sums *sums, const sums_messages *mail, int ranks, session_mail *out)
+static bool pack_sum_answers(const session_vertex_sums *sums, const sums_messages *mail, int ranks, session_mail *out)
 {
     const session_mail *requests = &mail->received_requests;
     const int64_t count = requests->total / KEY_WORDS, words = session_count_sum_words(sums->field_count);
@@ -203,7 +203,7 @@ static bool write_answers(const session_vertex_sums *sums, const sums_messages *
     return true;
 }
 
-static void add_answers(const sums_messages *mail, session_vertex_sums *sums)
+static void add_received_sums(const sums_messages *mail, session_vertex_sums *sums)
 {
     const int64_t words = session_count_sum_words(sums->field_count);
     for (int64_t i = 0; i < mail->received_answers.total / words; i++) {
@@ -219,11 +219,11 @@ static void add_answers(const sums_messages *mail, session_vertex_sums *sums)
 static insitu_status send_answers(const session_team *team, session_vertex_sums *sums, sums_messages *mail,
                                   base_error *error)
 {
-    if (!error->status && !write_answers(sums, mail, team->ranks, &mail->answers))
+    if (!error->status && !pack_sum_answers(sums, mail, team->ranks, &mail->answers))
         session_fail_for_memory(error, mail->received_requests.total * 24, "gradients at vertices that ranks share");
     const insitu_status status =
         session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->received_answers, error);
-    if (!status && !error->status) add_answers(mail, sums);
+    if (!status && !error->status) add_received_sums(mail, sums);
     return status;
 }
 
@@ -255,7 +255,7 @@ static void find_key_indices(const session_vertex_sums *sums, session_sum_part *
                              int threads)
 {
     const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
-    if (is_marked) mark_vertices(part);
+    if (is_marked) mark_vertices_of_drawn_cells(part);
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, part->mesh->cells.vertex_count))
     {
         region_enter();
@@ -305,7 +305,7 @@ static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *
 }
 
 /* Lists the cells of each part that contribute to sums, and computes bounds of these contributions on this rank. */
-static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
+static bool allocate_and_bound_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
     sums->sums = base_calloc(count, (size_t)session_count_sum_words(sums->field_count) * sizeof *sums->sums);
@@ -316,14 +316,15 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
         session_sum_part *part = &sums->parts[i];
         if (!make_polynomials(sums, part)) return false;
         const session_gradient_basis basis = make_gradient_basis(sums, part, threads);
-        if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
+        if (!session_list_cells_with_sums(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own))
+            return false;
         sums->bounds.largest_difference = fmax(sums->bounds.largest_difference, own.largest_difference);
         sums->bounds.largest_inverse_square = fmax(sums->bounds.largest_inverse_square, own.largest_inverse_square);
     }
     return true;
 }
 
-static bool add_sums(const session_vertex_sums *sums, const session_cell_list *lists, int threads)
+static bool add_gradients_to_sums(const session_vertex_sums *sums, const session_cell_list *lists, int threads)
 {
     unsigned char *owners = session_create_sum_owners(sums->keys.count, threads);
     bool is_done = owners != NULL;
@@ -343,7 +344,7 @@ static insitu_status compute_sums_over_ranks(const session_team *team, session_v
                                              session_cell_list *lists, base_error *error)
 {
     const int64_t bytes = sums->keys.count * session_count_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
-    if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
+    if (!error->status && !(lists && allocate_and_bound_sums(sums, lists, team->threads)))
         session_fail_for_memory(error, bytes, "gradients at vertices");
     /* the last entry is 1 if this rank has an error */
     double largest[3] = {sums->bounds.largest_difference, sums->bounds.largest_inverse_square,
@@ -352,7 +353,7 @@ static insitu_status compute_sums_over_ranks(const session_team *team, session_v
         error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");
     sums->bounds = (session_gradient_bounds){largest[0], largest[1]};
     if (!status && largest[2] > 0) status = session_agree(team->comm, error);
-    if (!status && !add_sums(sums, lists, team->threads))
+    if (!status && !add_gradients_to_sums(sums, lists, team->threads))
         session_fail_for_memory(error, bytes, "gradients at vertices");
     return status;
 }

@@ -17,7 +17,7 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
 
 /* Computes the checksum of contiguous bytes as several independent sums, which a CPU computes in parallel. In a single
  * sum, each multiplication would depend on the result of the previous one. */
-static uint64_t sum_words(const char *data, int64_t bytes)
+static uint64_t compute_checksum_of_packed_bytes(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
     for (; bytes >= (int64_t)sizeof words; bytes -= (int64_t)sizeof words, data += sizeof words) {
@@ -30,7 +30,7 @@ static uint64_t sum_words(const char *data, int64_t bytes)
     return mix_bits(mix_bits(lanes[0], lanes[1]), mix_bits(lanes[2], lanes[3]));
 }
 
-static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64_t count)
+static uint64_t compute_checksum_of_strided_array(const char *data, int64_t stride, size_t size, int64_t count)
 {
     uint64_t sum = 1;
     for (int64_t i = 0; i < count; i++) {
@@ -41,7 +41,7 @@ static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64
     return sum;
 }
 
-static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
+static uint64_t compute_checksum_of_array(const grid_array *a, int64_t count, int threads)
 {
     const int64_t size = grid_element_bytes(a), blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
     uint64_t sum = 0;
@@ -53,8 +53,9 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const int64_t first = block * BLOCK_VALUES;
             const int64_t values = count - first < BLOCK_VALUES ? count - first : BLOCK_VALUES;
             const char *data = a->data + first * a->stride;
-            const uint64_t own =
-                a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
+            const uint64_t own = a->stride == size
+                                     ? compute_checksum_of_packed_bytes(data, values * size)
+                                     : compute_checksum_of_strided_array(data, a->stride, (size_t)size, values);
             sum += mix_bits(own, (uint64_t)block); /* the sum does not depend on the order in which threads add
                                                       blocks */
         }
@@ -63,14 +64,14 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
     return sum;
 }
 
-static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_field *field, int threads)
+static uint64_t add_field_to_checksum(uint64_t sum, const session_mesh *mesh, const grid_field *field, int threads)
 {
     const int64_t count = field->is_cell_centred ? mesh->cells.cell_count : session_vertex_count(mesh);
     const int first = field->component < 0 ? 0 : field->component;
     const int end = field->component < 0 ? field->component_count : first + 1;
     for (int component = first; component < end && field->values.data; component++) {
         const grid_array a = grid_field_component(field, component);
-        sum = mix_bits(sum, sum_array(&a, count, threads));
+        sum = mix_bits(sum, compute_checksum_of_array(&a, count, threads));
     }
     return sum;
 }
@@ -80,11 +81,11 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
 static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_get_scalar_values(mesh, scalar);
-    const uint64_t sum = sum_field(0, mesh, &field, threads);
-    return field.source_cells ? sum_field(sum, mesh, field.source_cells, threads) : sum;
+    const uint64_t sum = add_field_to_checksum(0, mesh, &field, threads);
+    return field.source_cells ? add_field_to_checksum(sum, mesh, field.source_cells, threads) : sum;
 }
 
-static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_field *field)
+static uint64_t add_samples_to_checksum(uint64_t sum, const session_mesh *mesh, const grid_field *field)
 {
     enum { SAMPLES = 64 };
     const int64_t count = field->is_cell_centred ? mesh->cells.cell_count : session_vertex_count(mesh);
@@ -101,8 +102,8 @@ static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_
 static uint64_t compute_sample_checksum(const session_mesh *mesh, const session_scalar *scalar)
 {
     const grid_field field = session_get_scalar_values(mesh, scalar);
-    const uint64_t sum = sample_field(1, mesh, &field);
-    return field.source_cells ? sample_field(sum, mesh, field.source_cells) : sum;
+    const uint64_t sum = add_samples_to_checksum(1, mesh, &field);
+    return field.source_cells ? add_samples_to_checksum(sum, mesh, field.source_cells) : sum;
 }
 
 /* Warns if the caller has changed values in place but declared them unchanged. In this case trees contain ranges of the
@@ -141,7 +142,7 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
 /* Compares the checksums of all fields of one part of a mesh with those at the most recently drawn picture. If the part
  * is a block, returns the number of unchanged fields, which the caller adds to the report. If the part is a whole mesh,
  * adds its unchanged fields to the report and returns 0. The fields of mirror images are not counted. */
-static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
+static int64_t compare_checksums_of_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;
     for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
@@ -160,20 +161,20 @@ static int64_t compare_part(const session_mesh *mesh, int threads, session_repor
 
 /* Compares the checksums of the fields of blocks; each block is processed by one thread. Returns the number of fields
  * whose values have not changed. */
-static int64_t compare_blocks(const session_parts *parts, int threads)
+static int64_t compare_checksums_of_blocks(const session_parts *parts, int threads)
 {
     int64_t unchanged = 0;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(dynamic, 4) reduction(+ : unchanged) nowait
-        for (int i = 0; i < parts->count; i++) unchanged += compare_part(parts->items[i], 1, NULL);
+        for (int i = 0; i < parts->count; i++) unchanged += compare_checksums_of_part(parts->items[i], 1, NULL);
         region_leave();
     }
     return unchanged;
 }
 
-static void compare_parts(const session_parts *parts, int threads, session_report *report)
+static void compare_checksums_of_parts(const session_parts *parts, int threads, session_report *report)
 {
     enum { PARTS_A_THREAD = 4 };
     const bool are_blocks = parts->count >= PARTS_A_THREAD * threads && parts->items[0]->block != SESSION_WHOLE;
@@ -184,9 +185,9 @@ static void compare_parts(const session_parts *parts, int threads, session_repor
             if (mesh->scalars[k].is_used) warn_of_change(mesh, &mesh->scalars[k], report);
     }
     if (threads > 1 && are_blocks)
-        unchanged = compare_blocks(parts, threads);
+        unchanged = compare_checksums_of_blocks(parts, threads);
     else
-        for (int i = 0; i < parts->count; i++) unchanged += compare_part(parts->items[i], threads, report);
+        for (int i = 0; i < parts->count; i++) unchanged += compare_checksums_of_part(parts->items[i], threads, report);
     if (unchanged)
         session_text_add(&report->left_out,
                          "mesh \"%s\": %lld fields of blocks have the values of the last picture: no ranges",
@@ -197,7 +198,7 @@ void session_find_changed_values(const session_meshes *meshes, int threads, sess
 {
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_find_parts_from_index(meshes, i);
-        compare_parts(&parts, threads, report);
+        compare_checksums_of_parts(&parts, threads, report);
         i += parts.count;
     }
 }

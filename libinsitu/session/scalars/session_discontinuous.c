@@ -12,30 +12,32 @@
 
 /* ---- meshes with fields at corners --------------------------------------------------------------------------- */
 
-static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
+static bool is_field_at_corners(const session_mesh *mesh, const scene_field *field)
 {
     if (!scene_field_selects_mesh(field, mesh->name)) return false;
     const int index = session_find_field(mesh, field->name);
     return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
 }
 
-static bool is_mesh_used_by_image(const session_mesh *mesh, const scene_image *image)
+static bool is_corner_field_used_by_image(const session_mesh *mesh, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
-    bool is_in = image->condition.is_given && is_of_corners(mesh, &image->condition.field);
+    bool is_in = image->condition.is_given && is_field_at_corners(mesh, &image->condition.field);
     for (const scene_field *field; !is_in && (field = scene_next_field(&walk)) != NULL;)
-        is_in = is_of_corners(mesh, field);
+        is_in = is_field_at_corners(mesh, field);
     return is_in;
 }
 
 static bool is_corner_field_used_by_scene(const session_mesh *mesh, const scene *scene)
 {
     bool is_in = false;
-    for (int i = 0; i < scene->statistics_count; i++) is_in = is_in || is_of_corners(mesh, &scene->statistics[i].field);
+    for (int i = 0; i < scene->statistics_count; i++)
+        is_in = is_in || is_field_at_corners(mesh, &scene->statistics[i].field);
     for (int i = 0; i < scene->derived_count; i++)
         for (int k = 0; k < scene->derived[i].input_count; k++)
-            is_in = is_in || is_of_corners(mesh, &scene->derived[i].inputs[k]);
-    for (int i = 0; i < scene->image_count && !is_in; i++) is_in = is_mesh_used_by_image(mesh, &scene->images[i]);
+            is_in = is_in || is_field_at_corners(mesh, &scene->derived[i].inputs[k]);
+    for (int i = 0; i < scene->image_count && !is_in; i++)
+        is_in = is_corner_field_used_by_image(mesh, &scene->images[i]);
     return is_in;
 }
 
@@ -45,8 +47,8 @@ static int64_t find_shared_vertex_of_corner(const session_discontinuous *vertice
                                             int64_t corner)
 {
     if (vertices->are_corners_entries)
-        return grid_array_index(&vertices->shared_connectivity, session_find_connectivity_index(given, corner));
-    return grid_array_index(&vertices->shared_connectivity, grid_array_index(&vertices->corners, corner));
+        return grid_read_index(&vertices->shared_connectivity, session_find_connectivity_index(given, corner));
+    return grid_read_index(&vertices->shared_connectivity, grid_read_index(&vertices->corners, corner));
 }
 
 int64_t session_vertex_of_corner(const session_mesh *mesh, int64_t corner)
@@ -94,8 +96,8 @@ static bool copy_coordinates(const session_mesh *mesh, int threads, session_disc
 }
 
 /* Creates the connectivity of the discontinuous mesh, in which each corner of a cell is a vertex. */
-static insitu_status number_corners(const session_mesh *mesh, int threads, session_discontinuous *vertices,
-                                    base_error *error)
+static insitu_status make_discontinuous_connectivity(const session_mesh *mesh, int threads,
+                                                     session_discontinuous *vertices, base_error *error)
 {
     vertices->are_corners_entries = mesh->topology.is_split;
     vertices->shared_connectivity = vertices->are_corners_entries
@@ -103,7 +105,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
                                         : mesh->cells.connectivity;
     if (vertices->are_corners_entries) {
         vertices->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
-        return session_split_entries(mesh, threads, &vertices->corners, error);
+        return session_make_entry_connectivity(mesh, threads, &vertices->corners, error);
     }
     if (!session_allocate_indices(mesh, "cells' corners", vertices->corner_count, vertices->corner_count,
                                   &vertices->corners, error))
@@ -119,7 +121,7 @@ static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_er
     session_discontinuous vertices = {.is_active = true, .corner_count = session_count_corners(&mesh->given)};
     insitu_status status = refuse_polyhedra(mesh, error);
     if (status) return status;
-    status = number_corners(mesh, threads, &vertices, error);
+    status = make_discontinuous_connectivity(mesh, threads, &vertices, error);
     if (status) return status;
     vertices.is_made = copy_coordinates(mesh, threads, &vertices);
     if (!vertices.is_made) {
@@ -136,7 +138,7 @@ static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_er
 static void drop_vertex_data(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->cells_stamp = mesh->coordinates_stamp = ++meshes->stamp;
-    session_drop_outers(mesh, true);
+    session_drop_outer_surfaces(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
@@ -156,7 +158,7 @@ static insitu_status update_discontinuous_mesh(session_meshes *meshes, session_m
 
 /* ---- making meshes discontinuous ------------------------------------------------------------------------------- */
 
-static bool has_corners(const session_catalogue *catalogue)
+static bool has_any_corner_field(const session_catalogue *catalogue)
 {
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int f = 0; f < catalogue->meshes[m].field_count; f++)
@@ -174,5 +176,5 @@ insitu_status session_make_discontinuous(session_meshes *meshes, const session_c
         const bool is_discontinuous = !mesh->finer.parts && is_corner_field_used_by_scene(mesh, scene);
         if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }
-    return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
+    return has_any_corner_field(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }

@@ -47,7 +47,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
                          : are_equal_vectors(a->point, b->point);
 }
 
-session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
+session_scalar *session_find_distance_scalar(const session_mesh *mesh, const scene_plane *plane)
 {
     const session_plane given = convert_plane(plane);
     for (int i = 0; i < mesh->scalar_count; i++) {
@@ -81,7 +81,7 @@ static void recentre_plane(session_scalar *scalar, const scene_plane *plane, con
 bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
                            session_scalar **marked)
 {
-    session_scalar *scalar = session_find_distance(mesh, plane);
+    session_scalar *scalar = session_find_distance_scalar(mesh, plane);
     if (!scalar) scalar = add_distance(mesh, plane);
     *marked = scalar;
     if (!scalar) return false;
@@ -102,7 +102,7 @@ static void compute_distances(const session_mesh *mesh, const session_plane *pla
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < mesh->cells.vertex_count; v++) {
             double at[3];
-            grid_vertex(&mesh->cells, v, at);
+            grid_read_vertex_position(&mesh->cells, v, at);
             out[v] = (float)(n[0] * (at[0] - p[0]) + n[1] * (at[1] - p[1]) + n[2] * (at[2] - p[2]));
         }
         region_leave();

@@ -22,7 +22,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
                            session_scalar **marked);
 
 /* Returns the distances from the plane; NULL if the mesh has none. */
-session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
+session_scalar *session_find_distance_scalar(const session_mesh *mesh, const scene_plane *plane);
 
 /* Computes the distances that this step uses and that are out of date. Each distance is computed only from the vertex's
  * coordinates, so that all ranks obtain the same value. Local. */

@@ -44,7 +44,7 @@ static const char *describe_centring(insitu_centring centring)
 
 /* Returns whether the field has an index array. If no values are needed, the address of this array may be NULL; the
  * field has an index if the array's type is given. */
-static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
+static bool has_field_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_count_field_entries(&mesh->original, field) == 0);
 }
@@ -66,7 +66,7 @@ static insitu_status check_component_arrays(const insitu_field *field, int64_t c
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const int64_t position_count = session_count_field_entries(&mesh->original, field);
-    const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
+    const bool has_index = has_field_index(mesh, field), has_rows = field->corner_row != 0;
     if (field->count < 0 || (!has_index && (has_rows ? field->count < position_count : field->count != position_count)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
                          (long long)position_count, describe_centring(field->centring),
@@ -85,7 +85,7 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
 
 /* Checks a field that has values at the corners of cells. For meshes of mixed cells, the cells' types are checked
  * later, when the mesh is made discontinuous. */
-static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
+static insitu_status check_corner_field(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const long long row = field->corner_row, vertices = session_count_cell_nodes(mesh);
     if (field->centring != INSITU_CORNER) {
@@ -101,7 +101,7 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
     if (mesh->lattice)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh is a lattice: corners need cells by connectivity");
-    if (session_has_owners(mesh) || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
+    if (session_has_face_owners(mesh) || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh has polyhedra, whose corners have no order");
     if (row == 0) return INSITU_OK;
@@ -174,7 +174,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     if (field->patch_count && field->centring != INSITU_CELL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "has patches, and its centring %d is not cells (%d)",
                          (int)field->centring, (int)INSITU_CELL);
-    if (field->patch_count && session_corner_type((int)mesh->original.cell_type) != GRID_NO_TYPE)
+    if (field->patch_count && session_get_linear_type((int)mesh->original.cell_type) != GRID_NO_TYPE)
         return base_fail(error, INSITU_ERROR_FIELD, "has patches, and the mesh has cells of higher order");
     for (int i = 0; i < field->patch_count; i++) {
         base_error what = {0};
@@ -201,7 +201,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
         return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
     if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    insitu_status status = check_corners(&mesh->original, field, error);
+    insitu_status status = check_corner_field(&mesh->original, field, error);
     if (!status && field->fill) return check_fill_description(field, error);
     if (!status) status = check_field_arrays(mesh, field, error);
     if (!status) status = check_patches(mesh, field, error);
@@ -280,7 +280,7 @@ static bool copy_tables(session_field *field, const insitu_field *given, base_er
 }
 
 /* Sets the array from which the values are read: element i is the first component of tuple i. */
-static void set_value_array(session_field *field, const insitu_field *given)
+static void set_array_of_first_component(session_field *field, const insitu_field *given)
 {
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
     insitu_array values = given->values;
@@ -300,7 +300,7 @@ static void set_value_array(session_field *field, const insitu_field *given)
 static void set_value_arrays(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                              bool is_stale)
 {
-    const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
+    const bool has_index = has_field_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
         field->given.values.type != given->values.type || field->values.unusual_type || field->component_arrays ||
         was_apart)
@@ -312,7 +312,7 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
     field->given.name = name;
     field->given.patches = field->patches;
     field->given.components = field->components;
-    set_value_array(field, given);
+    set_array_of_first_component(field, given);
 }
 
 /* Stores a field's description. The tables of patches and components must have been copied before, unless is_same is
@@ -428,7 +428,7 @@ static insitu_status check_filled_field(const session_mesh *mesh, const insitu_f
     return check_field(mesh, &values, error);
 }
 
-insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error)
+insitu_status session_store_filled_field(session_mesh *mesh, int index, const insitu_field *filled, base_error *error)
 {
     session_field *field = &mesh->fields[index];
     const insitu_field promised = field->given;

@@ -16,7 +16,7 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
 
 /* Checks and stores a field's description after its fill function has set its values. The error message names the mesh
  * and the field. Local. */
-insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
+insitu_status session_store_filled_field(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 
 /* Marks the field's scalars as stale, because its values have changed. */
 void session_mark_scalars_stale(session_mesh *mesh, int field);

@@ -39,7 +39,7 @@ insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int
     if (field->is_filled) return error->status;
     field->is_filled = true;
     insitu_status status = call_fill_function(meshes, mesh, &field->given, &filled, error);
-    if (!status) status = session_store_filled(mesh, index, &filled, error);
+    if (!status) status = session_store_filled_field(mesh, index, &filled, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
             mesh->scalars[i].original_values = session_get_caller_values(mesh, index, mesh->scalars[i].component);
@@ -47,7 +47,8 @@ insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int
     return status;
 }
 
-static void fill_part(session_meshes *meshes, session_mesh *part, const char *name, bool of_images, base_error *error)
+static void fill_field_on_part(session_meshes *meshes, session_mesh *part, const char *name, bool of_images,
+                               base_error *error)
 {
     base_error own = {0};
     const int index = part->is_given ? session_find_field(part, name) : -1;
@@ -63,7 +64,7 @@ insitu_status session_fill_fields(session_meshes *meshes, const session_catalogu
         const session_parts parts = session_find_parts(meshes, all->name);
         for (int f = 0; f < all->field_count; f++)
             for (int i = 0; i < parts.count; i++)
-                fill_part(meshes, parts.items[i], all->fields[f].name, of_images, error);
+                fill_field_on_part(meshes, parts.items[i], all->fields[f].name, of_images, error);
     }
     return error->status;
 }

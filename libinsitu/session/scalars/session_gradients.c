@@ -70,7 +70,7 @@ typedef struct target {
 
 /* Returns the power of two by which numbers up to `largest` are multiplied, so that they fit into HIGH_BITS bits.
  * Returns 0 if `largest` is 0 or too small; all products are then 0. */
-static double find_power_of_two(double largest)
+static double find_scale_to_fit_high_bits(double largest)
 {
     int exponent = 0;
     frexp(largest, &exponent);
@@ -82,11 +82,11 @@ static double find_power_of_two(double largest)
  * rounded to integers. */
 static void find_rounding_units(const session_gradient_bounds *bounds, double units[2])
 {
-    units[0] = find_power_of_two(bounds->largest_difference * bounds->largest_inverse_square);
-    units[1] = find_power_of_two(0.2 * sqrt(bounds->largest_inverse_square));
+    units[0] = find_scale_to_fit_high_bits(bounds->largest_difference * bounds->largest_inverse_square);
+    units[1] = find_scale_to_fit_high_bits(0.2 * sqrt(bounds->largest_inverse_square));
 }
 
-static inline word_pair words_from_numbers(number_pair whole_with_shift)
+static inline word_pair extract_rounded_integers(number_pair whole_with_shift)
 {
     word_pair words, shift;
     const number_pair shifts = {ROUNDING_SHIFT, ROUNDING_SHIFT};
@@ -104,8 +104,8 @@ static void add_atomically(int64_t *to, word_pair words)
 }
 
 /* Rounds numbers to pairs of a high and a low word, and adds these to the words of a sum, two numbers at a time. */
-static inline __attribute__((always_inline)) void add_numbers(const target *to, int32_t entry,
-                                                              const number_pair *numbers, int pairs)
+static inline __attribute__((always_inline)) void add_numbers_to_fixed_point_sum(const target *to, int32_t entry,
+                                                                                 const number_pair *numbers, int pairs)
 {
     const number_pair shift = {ROUNDING_SHIFT, ROUNDING_SHIFT}, low_unit = {LOW_UNIT, LOW_UNIT};
     int64_t *sum = to->sums + (int64_t)entry * 4 * pairs;
@@ -113,7 +113,7 @@ static inline __attribute__((always_inline)) void add_numbers(const target *to, 
     for (int i = 0; i < pairs; i++) {
         const number_pair scaled = numbers[i] * to->units[i], high = scaled + shift;
         const number_pair low = (scaled - (high - shift)) * low_unit + shift;
-        word_pair of_high = words_from_numbers(high), of_low = words_from_numbers(low);
+        word_pair of_high = extract_rounded_integers(high), of_low = extract_rounded_integers(low);
         if (is_own) {
             word_pair words[2];
             memcpy(&words[0], sum + 2 * i, sizeof of_high);
@@ -144,15 +144,15 @@ void session_compute_mean_gradients(const int64_t *sum, int field_count, const s
 
 /* ---- contributions of corners -------------------------------------------------------------------------------- */
 
-static inline bool is_before(const node *a, const node *b)
+static inline bool is_lexicographically_smaller(const node *a, const node *b)
 {
     if (a->position[0] != b->position[0]) return a->position[0] < b->position[0];
     if (a->position[1] != b->position[1]) return a->position[1] < b->position[1];
     return a->position[2] < b->position[2];
 }
 
-static inline __attribute__((always_inline)) void bound_corner(target *to, double squares,
-                                                               const double rise[3][SESSION_GRADIENTS], int field_count)
+static inline __attribute__((always_inline)) void
+update_gradient_bounds(target *to, double squares, const double rise[3][SESSION_GRADIENTS], int field_count)
 {
     for (int i = 0; i < 3; i++)
         for (int f = 0; f < field_count; f++)
@@ -178,7 +178,7 @@ static inline __attribute__((always_inline)) void add_edge_gradient(target *to, 
         for (int a = 0; a < 3; a++) squares += edge[i][a] * edge[i][a];
     if (entry < 0 || !(squares >= LEAST_SQUARE)) return;
     if (!to->sums) {
-        bound_corner(to, squares, rise, field_count);
+        update_gradient_bounds(to, squares, rise, field_count);
         return;
     }
     for (int i = 0; i < 3; i++) vector3_cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i]);
@@ -189,17 +189,17 @@ static inline __attribute__((always_inline)) void add_edge_gradient(target *to, 
         for (int a = 0; a < 3; a++)
             sum += out.numbers[3 * f + a] =
                 ((rise[0][f] * normal[0][a] + rise[1][f] * normal[1][a]) + rise[2][f] * normal[2][a]) * scale;
-    if (out.numbers[3 * field_count] > 0 && isfinite(sum)) add_numbers(to, entry, out.pairs, pairs);
+    if (out.numbers[3 * field_count] > 0 && isfinite(sum)) add_numbers_to_fixed_point_sum(to, entry, out.pairs, pairs);
 }
 
-static inline __attribute__((always_inline)) void add_corner(target *to, const node *corner, const node *p,
-                                                             const node *q, const node *r, int field_count)
+static inline __attribute__((always_inline)) void add_gradient_at_corner(target *to, const node *corner, const node *p,
+                                                                         const node *q, const node *r, int field_count)
 {
     const node *swap, *ends[3] = {p, q, r};
     double edge[3][3], rise[3][SESSION_GRADIENTS];
-    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
-    if (is_before(ends[2], ends[1])) swap = ends[1], ends[1] = ends[2], ends[2] = swap;
-    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
+    if (is_lexicographically_smaller(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
+    if (is_lexicographically_smaller(ends[2], ends[1])) swap = ends[1], ends[1] = ends[2], ends[2] = swap;
+    if (is_lexicographically_smaller(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
     for (int i = 0; i < 3; i++) {
         for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
         for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->position[a] - corner->position[a];
@@ -218,10 +218,10 @@ static void set_normal_edge(double edge[3][3])
     for (int a = 0; a < 3; a++) edge[2][a] *= scale;
 }
 
-static void add_shell_corner(target *to, const node *corner, const node *p, const node *q)
+static void add_shell_corner_gradient(target *to, const node *corner, const node *p, const node *q)
 {
     const int field_count = to->basis->field_count;
-    const bool is_swapped = is_before(q, p);
+    const bool is_swapped = is_lexicographically_smaller(q, p);
     const node *ends[2] = {is_swapped ? q : p, is_swapped ? p : q};
     double edge[3][3], rise[3][SESSION_GRADIENTS] = {{0}};
     for (int i = 0; i < 2; i++) {
@@ -238,7 +238,7 @@ static inline __attribute__((always_inline)) bool read_node(const session_gradie
                                                             double scale, int field_count, node *out)
 {
     double sum = 0;
-    for (int a = 0; a < 3; a++) out->position[a] = grid_array_number(&basis->cells->coordinates[a], vertex) * scale;
+    for (int a = 0; a < 3; a++) out->position[a] = grid_read_number(&basis->cells->coordinates[a], vertex) * scale;
     for (int f = 0; f < field_count; f++) sum += out->values[f] = grid_field_value(&basis->fields[f], vertex);
     out->vertex = vertex;
     return isfinite(sum);
@@ -254,11 +254,12 @@ static const signed char wedge_corners[][4] = {{0, 1, 2, 3}, {1, 0, 2, 4}, {2, 0
 static const signed char pyramid_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 4}, {2, 1, 3, 4}, {3, 0, 2, 4},
                                                  {4, 0, 1, 2}, {4, 1, 2, 3}, {4, 2, 3, 0}, {4, 3, 0, 1}};
 
-static inline __attribute__((always_inline)) void
-add_cell_corners(target *to, int64_t cell, int type, const signed char (*corners)[4], int corner_count, int field_count)
+static inline __attribute__((always_inline)) void add_gradients_at_cell_corners(target *to, int64_t cell, int type,
+                                                                                const signed char (*corners)[4],
+                                                                                int corner_count, int field_count)
 {
     const session_gradient_basis *basis = to->basis;
-    const int count = grid_type_vertices(type);
+    const int count = grid_type_vertex_count(type);
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     node nodes[GRID_MAX_CELL_VERTICES];
     bool is_finite = true;
@@ -266,14 +267,15 @@ add_cell_corners(target *to, int64_t cell, int type, const signed char (*corners
     for (int i = 0; i < count; i++)
         is_finite = read_node(basis, vertices[i], to->scale, field_count, &nodes[i]) && is_finite;
     for (int i = 0; i < corner_count && is_finite; i++)
-        add_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]], &nodes[corners[i][3]],
-                   field_count);
+        add_gradient_at_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]],
+                               &nodes[corners[i][3]], field_count);
 }
 
 #define ADD_CELL_CORNERS(type, corners)                                                                                \
-    add_cell_corners(to, cell, type, corners, sizeof corners / sizeof *corners, field_count)
+    add_gradients_at_cell_corners(to, cell, type, corners, sizeof corners / sizeof *corners, field_count)
 
-static inline __attribute__((always_inline)) void add_typed_cell(target *to, int64_t cell, int type, int field_count)
+static inline __attribute__((always_inline)) void add_gradients_of_cell_type(target *to, int64_t cell, int type,
+                                                                             int field_count)
 {
     switch (type) {
     case GRID_TET: ADD_CELL_CORNERS(GRID_TET, tet_corners); break;
@@ -284,12 +286,12 @@ static inline __attribute__((always_inline)) void add_typed_cell(target *to, int
 }
 
 /* Adds the contributions of all corners of a tet, hex, wedge or pyramid. */
-static void add_solid_cell(target *to, int64_t cell, int type)
+static void add_gradients_of_solid_cell(target *to, int64_t cell, int type)
 {
     switch (to->basis->field_count) {
-    case 1: add_typed_cell(to, cell, type, 1); break;
-    case 2: add_typed_cell(to, cell, type, 2); break;
-    default: add_typed_cell(to, cell, type, 3); break;
+    case 1: add_gradients_of_cell_type(to, cell, type, 1); break;
+    case 2: add_gradients_of_cell_type(to, cell, type, 2); break;
+    default: add_gradients_of_cell_type(to, cell, type, 3); break;
     }
 }
 
@@ -305,8 +307,8 @@ typedef struct node_list {
 static int compare_nodes(const void *a, const void *b)
 {
     const node *x = a, *y = b;
-    if (is_before(x, y)) return -1;
-    if (is_before(y, x)) return 1;
+    if (is_lexicographically_smaller(x, y)) return -1;
+    if (is_lexicographically_smaller(y, x)) return 1;
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
@@ -357,7 +359,7 @@ static node find_centre(node_list *list, int field_count)
     return centre;
 }
 
-static void add_polyhedron(target *to, int64_t cell, node_list *list)
+static void add_gradients_of_polyhedron(target *to, int64_t cell, node_list *list)
 {
     const session_gradient_basis *basis = to->basis;
     const grid *g = basis->cells;
@@ -366,29 +368,29 @@ static void add_polyhedron(target *to, int64_t cell, node_list *list)
     const node centre = find_centre(list, basis->field_count);
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) {
-        grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
+        grid_face_vertices(g, grid_read_index(&g->connectivity, i), &from, &until);
         const int64_t count = until - from;
         for (int64_t n = 0; n < count; n++) {
             node nodes[3]; /* vertices of the face before the corner, at the corner, and after it */
             for (int k = 0; k < 3; k++)
-                read_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
+                read_node(basis, grid_read_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
                           basis->field_count, &nodes[k]);
-            add_corner(to, &nodes[1], &nodes[0], &nodes[2], &centre, basis->field_count);
+            add_gradient_at_corner(to, &nodes[1], &nodes[0], &nodes[2], &centre, basis->field_count);
         }
     }
 }
 
-static void add_shell(target *to, int64_t cell, node_list *list)
+static void add_gradients_of_shell(target *to, int64_t cell, node_list *list)
 {
     if (!list_nodes(list, to, cell)) return;
     for (int64_t n = 0; n < list->count; n++)
-        add_shell_corner(to, &list->nodes[n], &list->nodes[(n + list->count - 1) % list->count],
-                         &list->nodes[(n + 1) % list->count]);
+        add_shell_corner_gradient(to, &list->nodes[n], &list->nodes[(n + list->count - 1) % list->count],
+                                  &list->nodes[(n + 1) % list->count]);
 }
 
 /* ---- listing the cells that contribute ----------------------------------------------------------------------- */
 
-static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
+static bool has_finite_cell_values(const session_gradient_basis *basis, int64_t cell)
 {
     for (int f = 0; f < basis->field_count; f++)
         if (!grid_has_finite_cell_value(&basis->fields[f], cell)) return false;
@@ -397,7 +399,7 @@ static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
 
 /* Returns whether the cell contributes to sums. If of_shells is set, shells contribute; otherwise drawn cells with a
  * volume do. */
-static bool is_summed(const session_gradient_basis *basis, int64_t cell)
+static bool does_drawn_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
     return basis->of_shells ? !grid_is_ghost(basis->cells, cell) && grid_is_shell(basis->cells, cell)
                             : grid_is_drawn(basis->cells, cell);
@@ -408,29 +410,29 @@ static bool is_summed(const session_gradient_basis *basis, int64_t cell)
 static bool does_polynomial_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
     const session_polynomials *p = basis->polynomials;
-    const int64_t size = session_row_size(&p->rows, cell);
+    const int64_t size = session_count_nodes_of_cell(&p->rows, cell);
     int64_t piece = p->first_pieces[cell];
-    while (piece < p->first_pieces[cell + 1] && !is_summed(basis, piece)) piece++;
+    while (piece < p->first_pieces[cell + 1] && !does_drawn_cell_contribute(basis, piece)) piece++;
     if (piece == p->first_pieces[cell + 1]) return false;
     for (int n = 0; n < size; n++)
-        if (basis->sum_indices[session_find_row_vertex(&p->rows, cell, n)] >= 0) return true;
+        if (basis->sum_indices[session_find_vertex_of_node(&p->rows, cell, n)] >= 0) return true;
     return false;
 }
 
 static bool does_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
     if (basis->polynomials) return does_polynomial_cell_contribute(basis, cell);
-    if (!is_summed(basis, cell)) return false;
+    if (!does_drawn_cell_contribute(basis, cell)) return false;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex))
-        if (basis->sum_indices[vertex] >= 0) return has_own_values(basis, cell);
+        if (basis->sum_indices[vertex] >= 0) return has_finite_cell_values(basis, cell);
     return false;
 }
 
 /* Lists the cells with a vertex at which a sum is computed (sum_indices). The cells are counted first, so that threads
  * can fill a list of fixed size. */
-bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
+bool session_list_cells_with_sums(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
     const int64_t cells = basis->polynomials ? basis->polynomials->cell_count : basis->cells->cell_count;
@@ -475,19 +477,19 @@ done:
 
 /* ---- summing over the listed cells ----------------------------------------------------------------------------- */
 
-static void add_linear_cell(target *to, int64_t cell, node_list *buffer)
+static void add_gradients_of_linear_cell(target *to, int64_t cell, node_list *buffer)
 {
     const int type = grid_cell_type(to->basis->cells, cell);
     if (type == GRID_POLYHEDRON)
-        add_polyhedron(to, cell, buffer);
+        add_gradients_of_polyhedron(to, cell, buffer);
     else if (to->basis->of_shells)
-        add_shell(to, cell, buffer);
+        add_gradients_of_shell(to, cell, buffer);
     else
-        add_solid_cell(to, cell, type);
+        add_gradients_of_solid_cell(to, cell, type);
 }
 
 /* Adds the gradient of a cell's polynomial at its n-th node to the sum of this node, if a sum is computed there. */
-static void add_row_node(target *to, const session_derivatives *d, const node_list *row, int n)
+static void add_polynomial_gradient_at_node(target *to, const session_derivatives *d, const node_list *row, int n)
 {
     const int field_count = to->basis->field_count;
     const node *at = &row->nodes[n];
@@ -514,7 +516,7 @@ static void add_row_node(target *to, const session_derivatives *d, const node_li
 static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
 {
     if (row->nodes[n].vertex >= 0) return true;
-    return read_node(to->basis, session_find_row_vertex(&to->basis->polynomials->rows, cell, n), to->scale,
+    return read_node(to->basis, session_find_vertex_of_node(&to->basis->polynomials->rows, cell, n), to->scale,
                      to->basis->field_count, &row->nodes[n]);
 }
 
@@ -527,7 +529,7 @@ static bool read_summed_nodes(target *to, int64_t cell, const session_derivative
     bool is_finite = true;
     for (int n = 0; n < size; n++) row->nodes[n].vertex = -1;
     for (int n = 0; n < size && is_finite; n++) {
-        if (to->basis->sum_indices[session_find_row_vertex(&p->rows, cell, n)] < 0) continue;
+        if (to->basis->sum_indices[session_find_vertex_of_node(&p->rows, cell, n)] < 0) continue;
         is_finite = read_row_node(to, cell, row, n);
         const int end = d->starts[d->axis_count * (n + 1)];
         for (int t = d->starts[d->axis_count * n]; t < end && is_finite; t++)
@@ -546,10 +548,10 @@ static bool read_all_nodes(target *to, int64_t cell, node_list *row, int size)
 
 /* Adds the contributions of one of the caller's cells. If the derivatives of its polynomial are not implemented, or a
  * value is not finite, its linear pieces contribute instead. */
-static void add_polynomial_cell(target *to, int64_t cell, node_list *row)
+static void add_gradients_of_polynomial_cell(target *to, int64_t cell, node_list *row)
 {
     const session_polynomials *p = to->basis->polynomials;
-    const int size = (int)session_row_size(&p->rows, cell);
+    const int size = (int)session_count_nodes_of_cell(&p->rows, cell);
     const bool is_finer = p->nodal.kind_count > 0;
     if (!reserve_nodes(row, size)) return;
     bool is_finite = is_finer || read_all_nodes(to, cell, row, size);
@@ -558,19 +560,19 @@ static void add_polynomial_cell(target *to, int64_t cell, node_list *row)
     if (is_finer && d->axis_count) is_finite = read_summed_nodes(to, cell, d, row, size);
     if (is_finite && d->axis_count) {
         for (int n = 0; n < size; n++)
-            if (row->nodes[n].vertex >= 0) add_row_node(to, d, row, n);
+            if (row->nodes[n].vertex >= 0) add_polynomial_gradient_at_node(to, d, row, n);
         return;
     }
     for (int64_t piece = p->first_pieces[cell]; piece < p->first_pieces[cell + 1]; piece++)
-        if (is_summed(to->basis, piece)) add_linear_cell(to, piece, row);
+        if (does_drawn_cell_contribute(to->basis, piece)) add_gradients_of_linear_cell(to, piece, row);
 }
 
-static void add_cell(target *to, int64_t cell, node_list *buffer)
+static void add_gradients_of_cell(target *to, int64_t cell, node_list *buffer)
 {
     if (to->basis->polynomials)
-        add_polynomial_cell(to, cell, buffer);
+        add_gradients_of_polynomial_cell(to, cell, buffer);
     else
-        add_linear_cell(to, cell, buffer);
+        add_gradients_of_linear_cell(to, cell, buffer);
 }
 
 enum { NO_OWNER = 254, SHARED = 255 };
@@ -592,8 +594,8 @@ static void record_adding_thread(const target *to, int64_t vertex)
 static void record_adding_threads(const target *to, int64_t cell)
 {
     const session_polynomials *p = to->basis->polynomials;
-    const int64_t size = p ? session_row_size(&p->rows, cell) : 0;
-    for (int n = 0; n < size; n++) record_adding_thread(to, session_find_row_vertex(&p->rows, cell, n));
+    const int64_t size = p ? session_count_nodes_of_cell(&p->rows, cell) : 0;
+    for (int n = 0; n < size; n++) record_adding_thread(to, session_find_vertex_of_node(&p->rows, cell, n));
     if (p) return;
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
     int64_t vertex;
@@ -602,7 +604,8 @@ static void record_adding_threads(const target *to, int64_t cell)
 
 /* Adds the contributions of all cells. If to.owners is given, a first loop records which threads add to each sum. The
  * second loop, which adds the contributions, has the same schedule, so that each thread processes the same cells. */
-static bool add_all_cells(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
+static bool add_gradients_of_all_cells(const target *like, const session_cell_list *list,
+                                       session_gradient_bounds *bounds)
 {
     double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
@@ -620,7 +623,7 @@ static bool add_all_cells(const target *like, const session_cell_list *list, ses
             for (int64_t i = 0; i < list->count; i++) record_adding_threads(&to, list->cells[i]);
         }
 #pragma omp for schedule(static)
-        for (int64_t i = 0; i < list->count; i++) add_cell(&to, list->cells[i], &nodes);
+        for (int64_t i = 0; i < list->count; i++) add_gradients_of_cell(&to, list->cells[i], &nodes);
         rise = to.bounds.largest_difference;
         sharpness = to.bounds.largest_inverse_square;
         is_out_of_memory = nodes.is_out_of_memory;
@@ -635,7 +638,7 @@ bool session_bound_gradients(const session_gradient_basis *basis, const session_
                              session_gradient_bounds *out)
 {
     const target to = {.basis = basis, .scale = 1 / basis->length};
-    return add_all_cells(&to, list, out);
+    return add_gradients_of_all_cells(&to, list, out);
 }
 
 unsigned char *session_create_sum_owners(int64_t sum_count, int threads)
@@ -657,5 +660,5 @@ bool session_add_gradients(const session_gradient_basis *basis, const session_ce
     find_rounding_units(bounds, units);
     for (int i = 0; i < MOST_NUMBERS; i++)
         to.units[i / 2][i % 2] = i < 3 * basis->field_count ? units[0] : i == 3 * basis->field_count ? units[1] : 0;
-    return add_all_cells(&to, list, &unused);
+    return add_gradients_of_all_cells(&to, list, &unused);
 }

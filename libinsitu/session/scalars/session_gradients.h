@@ -55,7 +55,7 @@ typedef struct session_cell_list {
 
 /* Lists the cells that have a vertex at which a sum is computed. Returns false if memory runs out. The caller must free
  * out->cells. Local. */
-bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out);
+bool session_list_cells_with_sums(const session_gradient_basis *basis, session_cell_list *out);
 
 /* Computes the bounds of the numbers that the cells add to any sum. Returns false if memory runs out. Local. */
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,

@@ -23,7 +23,7 @@ void session_mark_field_for_statistics(const session_meshes *meshes, const scene
     }
 }
 
-void session_clear_requested_fields(const session_meshes *meshes)
+void session_clear_statistics_marks(const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++) meshes->items[m]->fields[f].is_in_statistics = false;
@@ -55,7 +55,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
                                      .component_stride = field->component_stride,
                                      .component_arrays = field->component_arrays,
                                      .component_count = given->component_count},
-                          .keeps_type = session_is_plain_copy(mesh, field),
+                          .keeps_type = session_does_copy_keep_type(mesh, field),
                           .row_length = 1,
                           .used_length = 1,
                           .count = given->count,
@@ -85,14 +85,14 @@ static int64_t find_value_entry(const indexed_values *v, int64_t position)
 static bool copy_tuple(const indexed_values *v, int64_t position, char *out)
 {
     const int64_t entry = find_value_entry(v, position);
-    const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
+    const int64_t at = v->index.data ? grid_read_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
     const int count = v->values.component_count;
     const size_t size = !v->keeps_type || v->values.values.is_wide ? 8 : 4;
     out += position * count * (int64_t)size;
     for (int i = 0; i < count; i++, out += size) {
         const grid_array from = grid_field_component(&v->values, i);
-        const double number = v->keeps_type ? 0 : grid_array_number(&from, at);
+        const double number = v->keeps_type ? 0 : grid_read_number(&from, at);
         if (!v->keeps_type)
             memcpy(out, &number, 8);
         else if (size == 8)
@@ -113,7 +113,7 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
                      "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
                      "%lld)",
                      mesh->label, field->given.name, words[centring], number,
-                     (long long)grid_array_index(&v->index, entry) + base, base, v->count - 1 + base, base);
+                     (long long)grid_read_index(&v->index, entry) + base, base, v->count - 1 + base, base);
 }
 
 static insitu_status copy_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
@@ -143,10 +143,10 @@ static void read_node(const void *of, int64_t position, double *tuple)
 {
     const indexed_values *v = of;
     const int64_t entry = find_value_entry(v, position);
-    const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
+    const int64_t at = v->index.data ? grid_read_index(&v->index, entry) : entry;
     for (int i = 0; i < v->values.component_count; i++) {
         const grid_array from = grid_field_component(&v->values, i);
-        tuple[i] = grid_array_number(&from, at);
+        tuple[i] = grid_read_number(&from, at);
     }
 }
 
@@ -158,7 +158,7 @@ static insitu_status check_index(const session_mesh *mesh, const session_field *
     const bool at_vertices = field->given.centring == INSITU_VERTEX;
     const int64_t count = at_vertices ? mesh->original.vertex_count : session_count_corners(&mesh->original);
     for (int64_t position = 0; position < count && v->index.data; position++) {
-        const int64_t entry = find_value_entry(v, position), at = grid_array_index(&v->index, entry);
+        const int64_t entry = find_value_entry(v, position), at = grid_read_index(&v->index, entry);
         if (at < 0 || at >= v->count) return describe_fault(mesh, field, v, entry, error);
     }
     return INSITU_OK;
@@ -182,8 +182,8 @@ static insitu_status interpolate_values(const session_mesh *mesh, session_field 
     return status;
 }
 
-insitu_status session_read_nodes(const session_mesh *mesh, int index, session_use_values *use, void *of,
-                                 base_error *error)
+insitu_status session_pass_node_values(const session_mesh *mesh, int index, session_use_values *use, void *of,
+                                       base_error *error)
 {
     const session_field *field = &mesh->fields[index];
     base_error fault = {.status = INSITU_OK};

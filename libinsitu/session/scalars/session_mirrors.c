@@ -78,13 +78,13 @@ static insitu_status set_field_on_mirror_image(session_meshes *meshes, session_m
     return status;
 }
 
-static void share_fields(session_meshes *meshes, session_mesh *image, base_error *error)
+static void set_fields_on_mirror_image(session_meshes *meshes, session_mesh *image, base_error *error)
 {
     for (int f = 0; f < image->source->field_count && !error->status; f++)
         set_field_on_mirror_image(meshes, image, &image->source->fields[f], error);
 }
 
-static void share_derived_field(session_mesh *image, const char *name)
+static void borrow_derived_field_of_source(session_mesh *image, const char *name)
 {
     const int index = session_find_field(image, name), at = session_find_field(image->source, name);
     if (index < 0 || at < 0) return;
@@ -105,16 +105,17 @@ static void share_derived_field(session_mesh *image, const char *name)
             image->scalars[i].original_values = session_get_caller_values(image, index, image->scalars[i].component);
 }
 
-void session_share_derived_values(const session_meshes *meshes, const char *name)
+void session_lend_derived_values_to_mirrors(const session_meshes *meshes, const char *name)
 {
     for (int i = 0; i < meshes->count; i++)
-        if (meshes->items[i]->source && meshes->items[i]->is_given) share_derived_field(meshes->items[i], name);
+        if (meshes->items[i]->source && meshes->items[i]->is_given)
+            borrow_derived_field_of_source(meshes->items[i], name);
 }
 
 /* ---- mirror images ----------------------------------------------------------------------------------------------- */
 
-static void update_image(const scene_mirror *mirror, session_meshes *meshes, session_mesh *source, int axes,
-                         int threads, base_error *error)
+static void update_mirror_image(const scene_mirror *mirror, session_meshes *meshes, session_mesh *source, int axes,
+                                int threads, base_error *error)
 {
     const bool is_drawn = mirror && source->is_given && (axes & ~mirror->axes) == 0;
     session_mesh *image = session_find_mirror_image(meshes, source, axes);
@@ -123,7 +124,7 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
         return;
     }
     image = session_mirror_mesh(meshes, source, axes, mirror->planes, threads, error);
-    if (image) share_fields(meshes, image, error);
+    if (image) set_fields_on_mirror_image(meshes, image, error);
 }
 
 /* The catalogue, which lists the meshes and fields of all ranks, does not change, because mirror images have the names
@@ -135,7 +136,7 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
         session_mesh *source = meshes->items[i];
         const scene_mirror *mirror = source->source ? NULL : scene_find_mirror(scene, source->name);
         for (int axes = 1; axes <= ALL_AXES && !source->source; axes++)
-            update_image(mirror, meshes, source, axes, threads, error);
+            update_mirror_image(mirror, meshes, source, axes, threads, error);
     }
     meshes->are_names_changed = are_names_changed;
 }

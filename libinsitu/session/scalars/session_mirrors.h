@@ -13,7 +13,7 @@
 void session_update_mirrors(const scene *scene, session_meshes *meshes, int threads, base_error *error);
 
 /* Copies the values of a derived field from the source meshes to their mirror images. Local. */
-void session_share_derived_values(const session_meshes *meshes, const char *name);
+void session_lend_derived_values_to_mirrors(const session_meshes *meshes, const char *name);
 
 /* Warns of mirrors in the scene that name no mesh, and of meshes with cells on both sides of a mirror plane, because
  * such a mesh overlaps its mirror image. Collective. */

@@ -43,8 +43,8 @@ static session_scalar *find_scalar(const session_mesh *mesh, int field, int comp
     return NULL;
 }
 
-session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
-                                       uint64_t mesh_group_name)
+session_scalar *session_find_recentred_scalar(const session_mesh *mesh, const char *field, int component,
+                                              uint64_t mesh_group_name)
 {
     const int index = session_find_field(mesh, field);
     return index < 0 ? NULL : find_scalar(mesh, index, component, true, mesh_group_name);
@@ -79,7 +79,7 @@ bool session_is_interpolated(const session_mesh *mesh, const session_field *fiel
     return mesh->finer.parts && field->given.centring != INSITU_CELL && !field->is_derived;
 }
 
-bool session_is_plain_copy(const session_mesh *mesh, const session_field *field)
+bool session_does_copy_keep_type(const session_mesh *mesh, const session_field *field)
 {
     return !field->component_arrays && !field->values.unusual_type && !session_is_interpolated(mesh, field);
 }
@@ -113,7 +113,7 @@ grid_field session_get_caller_values(const session_mesh *mesh, int index, int co
             out.component_arrays = field->component_arrays;
         return out;
     }
-    if (!session_is_plain_copy(mesh, field)) out.values = (grid_array){.is_wide = true};
+    if (!session_does_copy_keep_type(mesh, field)) out.values = (grid_array){.is_wide = true};
     out.component_stride = out.values.is_wide ? 8 : 4;
     out.values.data = field->copy;
     out.values.stride = out.component_stride * out.component_count;
@@ -205,8 +205,8 @@ static bool includes_shells(const session_scalar *scalar, session_extent_kind ki
     return kind != SESSION_SOLID && !scalar->distances;
 }
 
-static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool of_shells,
-                                    bool is_positive)
+static session_extremes find_range_of_scalar_values(const grid *g, const grid_field *field, int threads, bool of_shells,
+                                                    bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, g->cell_count))
@@ -232,7 +232,8 @@ void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar
     session_extremes *known = &scalar->extremes[is_same ? SESSION_SEEN : kind];
     if (!known->is_known) {
         const grid_field field = session_get_scalar_values(mesh, scalar);
-        *known = find_extent(&mesh->cells, &field, threads, includes_shells(scalar, kind), kind == SESSION_POSITIVE);
+        *known = find_range_of_scalar_values(&mesh->cells, &field, threads, includes_shells(scalar, kind),
+                                             kind == SESSION_POSITIVE);
     }
     *low = known->low;
     *high = known->high;

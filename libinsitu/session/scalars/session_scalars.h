@@ -23,8 +23,8 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
 
 /* Returns the scalar that holds the field's values averaged at vertices over a mesh group; NULL if there is none.
  * mesh_group_name: the hash that identifies the mesh group (session_mesh_group.name). */
-session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
-                                       uint64_t mesh_group_name);
+session_scalar *session_find_recentred_scalar(const session_mesh *mesh, const char *field, int component,
+                                              uint64_t mesh_group_name);
 
 /* Returns the mesh's field, or a component of it, with the values that the caller has given, in the order of the
  * vertices or cells. */
@@ -41,7 +41,7 @@ bool session_is_interpolated(const session_mesh *mesh, const session_field *fiel
 /* Returns whether a copy contains the values in their own type. Otherwise it contains doubles: components in separate
  * arrays may have different types, other values may be integers or not aligned, and polynomials are evaluated in
  * double. */
-bool session_is_plain_copy(const session_mesh *mesh, const session_field *field);
+bool session_does_copy_keep_type(const session_mesh *mesh, const session_field *field);
 
 /* Finds the field's values as given by the caller, without creating a scalar. Returns false if the mesh does not have
  * the field. */

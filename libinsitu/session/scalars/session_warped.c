@@ -24,7 +24,7 @@ typedef struct warp_step {
 
 /* Returns whether displacements with only the components x and y are allowed. They are allowed if all cells are shells
  * of one type, or if no z coordinates are given. */
-static bool is_of_shells(const insitu_mesh *mesh)
+static bool may_displacement_lack_z(const insitu_mesh *mesh)
 {
     return session_may_lack_z(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
 }
@@ -49,7 +49,7 @@ static insitu_status check_field(const warp_step *step, const scene_warp *warp, 
     if (given->centring != INSITU_VERTEX)
         return REFUSE(step, warp, error, "field \"%s\" of mesh \"%s\" has values at %s, expected values at vertices",
                       warp->field, mesh->label, centrings[given->centring]);
-    const bool has_two = is_of_shells(&mesh->given);
+    const bool has_two = may_displacement_lack_z(&mesh->given);
     if (given->component_count == 3 || (given->component_count == 2 && has_two)) return INSITU_OK;
     return REFUSE(step, warp, error, "field \"%s\" of mesh \"%s\" has %d component%s, expected %s", warp->field,
                   mesh->label, given->component_count, given->component_count == 1 ? "" : "s",
@@ -76,7 +76,8 @@ static session_displacement read_displacement(const scene_warp *warp, const sess
     session_displacement out = {.field = index,
                                 .key = hash_displacement(warp, field),
                                 .component_count = field->given.component_count,
-                                .index = session_index_array(session_nodal_mesh(mesh), &field->given.index),
+                                .index =
+                                    session_index_array(session_get_mesh_of_caller_nodes(mesh), &field->given.index),
                                 .count = field->given.count,
                                 .scale = warp->scale};
     for (int c = 0; c < out.component_count; c++) out.components[c] = grid_field_component(&values, c);

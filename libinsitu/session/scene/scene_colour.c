@@ -55,7 +55,7 @@ static insitu_status fill_table_from_points(const scene_document *d, const scene
                                             const char *name, scene_colour_map *out)
 {
     if (points->is_banded) return fill_table_with_bands(d, points, name, out);
-    const insitu_status status = make_table(d, name, colour_table_entries(points->items, points->count), out);
+    const insitu_status status = make_table(d, name, colour_choose_table_size(points->items, points->count), out);
     if (status == INSITU_OK) colour_fill_table(points->items, points->count, points->space, out->colours, out->count);
     return status;
 }

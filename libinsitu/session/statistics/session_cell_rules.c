@@ -51,7 +51,7 @@ static int count_points_of_degree(int degree)
     return degree / 2 + 1;
 }
 
-static int count_points_of_first_factor(const session_nodes *of, bool is_bent)
+static int count_points_of_first_rule_factor(const session_nodes *of, bool is_bent)
 {
     const int p = of->order;
     if (grid_is_shell_type(of->type)) return 4 * p;
@@ -72,8 +72,8 @@ static int count_line_points(const session_nodes *of, bool is_bent)
 
 /* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. out[n * stride] receives
  * the value for node n, and out[n * stride + slopes] the derivative. */
-static void find_line_functions(const session_rule_factor *factor, const double *nodes, double at, double *out,
-                                int stride, int slopes)
+static void evaluate_line_nodal_functions(const session_rule_factor *factor, const double *nodes, double at,
+                                          double *out, int stride, int slopes)
 {
     const int p = factor->order;
     for (int n = 0; n <= p; n++) {
@@ -91,8 +91,8 @@ static void find_line_functions(const session_rule_factor *factor, const double 
 /* Computes Silvester's functions (the Lagrange polynomials of equispaced nodes, session_derivatives.c) of a triangle or
  * tet at a point, and their derivatives along each axis. out[n * stride] receives the value for node n, and out[n *
  * stride + k * slopes] the derivative along axis k = 1, 2 or 3. */
-static void find_simplex_functions(const session_rule_factor *factor, const double at[3], double *out, int stride,
-                                   int slopes)
+static void evaluate_simplex_nodal_functions(const session_rule_factor *factor, const double at[3], double *out,
+                                             int stride, int slopes)
 {
     double values[4][NODES_MOST_ORDER + 1], derivatives[4][NODES_MOST_ORDER + 1];
     const int p = factor->order, dimensions = factor->rule.dimensions;
@@ -122,12 +122,12 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
 
 /* Returns the number of doubles that the nodal functions of a factor (a line, triangle or tet) and their derivatives
  * take at one block of quadrature points. */
-static size_t count_block_numbers(const session_rule_factor *factor)
+static size_t count_numbers_of_point_block(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
 }
 
-static void fill_block(const session_rule_factor *factor, int first, double *out)
+static void evaluate_nodal_functions_at_block(const session_rule_factor *factor, int first, double *out)
 {
     const int slopes = factor->node_count * factor->width;
     double nodes[NODES_MOST_ORDER + 1];
@@ -135,9 +135,9 @@ static void fill_block(const session_rule_factor *factor, int first, double *out
     for (int n = 0; n < factor->width && first + n < factor->rule.count; n++) {
         const double *at = factor->rule.points[first + n];
         if (factor->rule.dimensions == 1)
-            find_line_functions(factor, nodes, at[0], out + n, factor->width, slopes);
+            evaluate_line_nodal_functions(factor, nodes, at[0], out + n, factor->width, slopes);
         else
-            find_simplex_functions(factor, at, out + n, factor->width, slopes);
+            evaluate_simplex_nodal_functions(factor, at, out + n, factor->width, slopes);
     }
 }
 
@@ -145,22 +145,23 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
 {
     const int simplex = dimensions == 2 ? GRID_TRIANGLE : GRID_TET;
     out->order = order;
-    out->node_count = dimensions > 1 ? session_complete_nodes(simplex, order).count : order + 1;
+    out->node_count = dimensions > 1 ? session_describe_complete_nodes(simplex, order).count : order + 1;
     out->is_lobatto = is_lobatto;
     if (!session_make_quadrature(dimensions, points, &out->rule)) return false;
     const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
     out->width = whole < BLOCK ? whole : BLOCK;
     const size_t blocks = (size_t)(out->rule.count - 1) / (size_t)out->width + 1;
-    if (dimensions > 1 && blocks * count_block_numbers(out) > MOST_FUNCTIONS) return true;
-    out->functions = base_calloc(blocks * count_block_numbers(out), sizeof *out->functions);
+    if (dimensions > 1 && blocks * count_numbers_of_point_block(out) > MOST_FUNCTIONS) return true;
+    out->functions = base_calloc(blocks * count_numbers_of_point_block(out), sizeof *out->functions);
     for (size_t b = 0; b < blocks && out->functions; b++)
-        fill_block(out, (int)b * out->width, out->functions + b * count_block_numbers(out));
+        evaluate_nodal_functions_at_block(out, (int)b * out->width,
+                                          out->functions + b * count_numbers_of_point_block(out));
     return out->functions;
 }
 
 /* ---- quadrature rules for one type and order of cells ------------------------------------------------------------ */
 
-static bool is_box(int type)
+static bool is_product_of_lines(int type)
 {
     return type == GRID_HEX || type == GRID_QUAD;
 }
@@ -168,7 +169,7 @@ static bool is_box(int type)
 static bool make_rule(const session_nodes *of, int line_count, bool is_lobatto, bool is_bent, session_product_rule *out)
 {
     const int axes = grid_is_shell_type(of->type) ? 2 : AXES;
-    return make_factor(axes - line_count, of->order, is_lobatto, count_points_of_first_factor(of, is_bent),
+    return make_factor(axes - line_count, of->order, is_lobatto, count_points_of_first_rule_factor(of, is_bent),
                        &out->first) &&
            (line_count == 0 || make_factor(1, of->order, is_lobatto, count_line_points(of, is_bent), &out->line));
 }
@@ -189,7 +190,7 @@ static bool compute_corner_function_values(bool is_lobatto, session_cell_rules *
     for (int n = 0; n < (p + 1) * (p + 1) * (p + 1); n++) {
         const int at[3] = {n % (p + 1), n / (p + 1) % (p + 1), n / (p + 1) / (p + 1)};
         if (!session_has_node(of, at[0], at[1], at[2])) continue;
-        const int node = session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
+        const int node = session_find_node_in_connectivity(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
         for (int c = 0; c < shape->corner_count; c++) {
             double first = 1, product = 1;
             for (int a = 0; a < simplex; a++) first -= line[at[a]];
@@ -206,10 +207,10 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                              session_cell_rules *out)
 {
     const bool is_pyramid = of->type == GRID_PYRAMID, has_straight = !is_pyramid && !grid_is_shell_type(of->type);
-    const bool has_spacing = is_lobatto && is_box(of->type);
+    const bool has_spacing = is_lobatto && is_product_of_lines(of->type);
     const int type = is_pyramid ? GRID_HEX : of->type;
-    const session_nodes nodes = is_pyramid ? session_complete_nodes(GRID_HEX, of->order) : *of;
-    *out = (session_cell_rules){.lattice = session_complete_nodes(type, of->order),
+    const session_nodes nodes = is_pyramid ? session_describe_complete_nodes(GRID_HEX, of->order) : *of;
+    *out = (session_cell_rules){.lattice = session_describe_complete_nodes(type, of->order),
                                 .line_count = type == GRID_HEX                          ? 2
                                               : type == GRID_QUAD || type == GRID_WEDGE ? 1
                                                                                         : 0};
@@ -299,7 +300,7 @@ static void multiply_three_components(const double *matrix, int node_count, int 
     multiply_by_matrix(matrix, node_count, width, values, 3, out);
 }
 
-static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
+static double compute_volume_element(double (*slopes)[AXES][BLOCK], int axes, int point)
 {
     double s[AXES][AXES], cross[AXES];
     for (int axis = 0; axis < axes; axis++)
@@ -312,7 +313,7 @@ static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
 
 /* Passes one block of quadrature points of the first factor (a line, triangle or tet) to the visitor function. weight:
  * product of the quadrature weights of the current points on the further lines. */
-static void visit_block(const cell_visit *v, int first, const double *functions, double weight)
+static void visit_block_of_quadrature_points(const cell_visit *v, int first, const double *functions, double weight)
 {
     const session_rule_factor *factor = &v->rule->first;
     const int nodes = factor->node_count, width = factor->width, dimensions = factor->rule.dimensions;
@@ -329,18 +330,18 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
                                   slopes[dimensions + lines - 1 - line]);
     const int count = rest < width ? rest : width;
     for (int i = 0; i < count; i++)
-        measures[i] = weight * factor->rule.weights[first + i] * find_measure(slopes, dimensions + lines, i);
+        measures[i] = weight * factor->rule.weights[first + i] * compute_volume_element(slopes, dimensions + lines, i);
     v->visit(v->of, count, measures, values[0]);
 }
 
-static void visit_points_of_first_factor(const cell_visit *v, double weight)
+static void visit_points_of_first_rule_factor(const cell_visit *v, double weight)
 {
     const session_rule_factor *factor = &v->rule->first;
     const double *functions = factor->functions ? factor->functions : v->functions;
     for (int first = 0; first < factor->rule.count; first += factor->width) {
-        if (!factor->functions) fill_block(factor, first, v->functions);
-        visit_block(v, first, functions, weight);
-        if (factor->functions) functions += count_block_numbers(factor);
+        if (!factor->functions) evaluate_nodal_functions_at_block(factor, first, v->functions);
+        visit_block_of_quadrature_points(v, first, functions, weight);
+        if (factor->functions) functions += count_numbers_of_point_block(factor);
     }
 }
 
@@ -361,7 +362,7 @@ static void evaluate_lattice_on_line(const cell_visit *v, int lines, int point)
 {
     const session_rule_factor *line = &v->rule->line;
     const double *values =
-        line->functions + (size_t)(point / line->width) * count_block_numbers(line) + point % line->width;
+        line->functions + (size_t)(point / line->width) * count_numbers_of_point_block(line) + point % line->width;
     const double *slopes = values + line->node_count * line->width;
     const size_t size = count_lattice_nodes(v->rules, lines - 1), stride = size * (size_t)line->node_count;
     const int components = SIZE + 3 * (v->rules->line_count - lines);
@@ -381,7 +382,8 @@ static void visit_points(const cell_visit *v)
         if (lines > 1) evaluate_lattice_on_line(v, 2, k);
         for (int j = 0; j < along; j++) {
             if (lines > 0) evaluate_lattice_on_line(v, 1, j);
-            visit_points_of_first_factor(v, (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
+            visit_points_of_first_rule_factor(v,
+                                              (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
         }
     }
 }
@@ -407,8 +409,8 @@ static bool is_straight(const session_cell_rules *rules, const double *tuples, c
     return most <= tolerance * size;
 }
 
-void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
-                        session_visit_points *visit, void *of)
+void session_visit_quadrature_points(const session_cell_rules *rules, const double *tuples, double *work,
+                                     session_visit_points *visit, void *of)
 {
     cell_visit v = {.rules = rules, .visit = visit, .of = of};
     const size_t nodes = (size_t)rules->lattice.count;
@@ -419,7 +421,7 @@ void session_visit_cell(const session_cell_rules *rules, const double *tuples, d
         v.lattices[lines] = next;
         next += MOST_SIZE * count_lattice_nodes(rules, lines);
     }
-    session_complete_tuples(&rules->nodes, SIZE, tuples, complete);
+    session_fill_complete_cell_tuples(&rules->nodes, SIZE, tuples, complete);
     if (rules->collapse)
         session_multiply_matrix(rules->collapse, rules->lattice.count, rules->nodes.complete.count, 1, SIZE, complete,
                                 expanded);

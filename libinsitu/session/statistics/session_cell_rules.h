@@ -52,18 +52,18 @@ bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order,
                              session_cell_rules *out);
 void session_drop_cell_rules(session_cell_rules *rules);
 
-/* Function that receives `count` quadrature points of a cell. of: the pointer that was passed to session_visit_cell();
- * measures: for each point, its weight times the determinant of the map's Jacobian, or times the area element of a
- * shell; values: for each point, the value of the cell's polynomial. */
+/* Function that receives `count` quadrature points of a cell. of: the pointer that was passed to
+ * session_visit_quadrature_points(); measures: for each point, its weight times the determinant of the map's Jacobian,
+ * or times the area element of a shell; values: for each point, the value of the cell's polynomial. */
 typedef void session_visit_points(void *of, int count, const double *measures, const double *values);
 
-/* Returns the number of doubles that session_visit_cell() needs as working memory. */
+/* Returns the number of doubles that session_visit_quadrature_points() needs as working memory. */
 size_t session_cell_rules_work_size(const session_cell_rules *rules);
 
 /* Calls `visit` for the quadrature points of a cell, always in the same order. tuples: x, y, z and a value at each of
  * the cell's nodes, in the order of its nodes in connectivity. work: session_cell_rules_work_size() doubles of working
  * memory. of: pointer that is passed to `visit`. */
-void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
-                        session_visit_points *visit, void *of);
+void session_visit_quadrature_points(const session_cell_rules *rules, const double *tuples, double *work,
+                                     session_visit_points *visit, void *of);
 
 #endif

@@ -11,7 +11,7 @@ bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycl
     return statistics->cycle_interval <= 1 || cycle % statistics->cycle_interval == 0;
 }
 
-bool session_has_events(const scene *scene, int64_t cycle, bool images)
+bool session_are_any_statistics_needed(const scene *scene, int64_t cycle, bool images)
 {
     for (int i = 0; i < scene->statistics_count; i++)
         if (session_are_statistics_due(&scene->statistics[i], cycle)) return true;
@@ -91,9 +91,10 @@ static void store_conditions(session_events *events, const scene *scene, const e
     }
 }
 
-insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
-                                    const session_catalogue *catalogue, const session_team *team,
-                                    const session_event_time *now, const session_valid_events *valid, base_error *error)
+insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
+                                                 const session_catalogue *catalogue, const session_team *team,
+                                                 const session_event_time *now, const session_valid_events *valid,
+                                                 base_error *error)
 {
     event_work work;
     if (!work_create(scene, now->cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");

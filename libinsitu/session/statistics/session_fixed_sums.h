@@ -30,7 +30,7 @@ static inline double position_in_range(double value, double low, double high)
 }
 
 /* Returns the value's position in the range, 0 at low and 1 at high, limited to 0 .. 1. */
-static inline double share_of_range(double value, double low, double high)
+static inline double clamped_position_in_range(double value, double low, double high)
 {
     return fmin(fmax(position_in_range(value, low, high), 0), 1);
 }
@@ -42,15 +42,15 @@ typedef struct session_bins {
 } session_bins;
 
 /* Returns the bin of a value; values outside the range of the bins belong to the first or the last bin. */
-static inline int find_bin_within(const session_bins *bins, double value)
+static inline int find_nearest_bin(const session_bins *bins, double value)
 {
-    return (int)fmin(share_of_range(value, bins->low, bins->high) * bins->count, bins->count - 1);
+    return (int)fmin(clamped_position_in_range(value, bins->low, bins->high) * bins->count, bins->count - 1);
 }
 
 /* Returns the bin of a value, or -1 if the value is outside the range of the bins. */
 static inline int find_bin(const session_bins *bins, double value)
 {
-    return value < bins->low || value > bins->high ? -1 : find_bin_within(bins, value);
+    return value < bins->low || value > bins->high ? -1 : find_nearest_bin(bins, value);
 }
 
 #endif

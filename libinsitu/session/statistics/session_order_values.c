@@ -56,7 +56,7 @@ static double find_component_of_tuple(const grid_field *field, const double *tup
 static void read_caller_values(const order_pass *p, int64_t cell, int count, double *tuple, double *out)
 {
     const session_node_values *values = p->values;
-    const int64_t first = session_row_first(&p->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&p->rows, cell);
     for (int n = 0; n < count; n++) {
         values->read(values->of,
                      values->is_by_entry ? session_row_entry(&p->rows, cell, n)
@@ -72,18 +72,18 @@ static void read_lattice_values(const order_pass *p, const session_interpolation
 {
     const session_nodes *of = &nodes->complete;
     const int finest = of->order * p->of->mesh->finer.parts;
-    session_nodes fine = session_complete_nodes(of->type, finest);
-    if (session_row_size(&p->lattice, cell) != fine.count) fine = *of;
+    session_nodes fine = session_describe_complete_nodes(of->type, finest);
+    if (session_count_nodes_of_cell(&p->lattice, cell) != fine.count) fine = *of;
     const int step = fine.order / of->order, size = of->order + 1;
     for (int n = 0; n < size * size * size; n++) {
         const int at[3] = {n % size, n / size % size, n / size / size};
         if (!session_has_node(of, at[0], at[1], at[2])) continue;
-        const int node = session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
+        const int node = session_find_node_in_connectivity(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
         const int position = nodes->positions[node];
         if (position >= nodes->of.count) continue;
-        const int finer =
-            session_node_index(&fine, INSITU_ORDER_LEXICOGRAPHIC, step * at[0], step * at[1], step * at[2]);
-        out[position] = grid_field_value(&p->of->values, session_find_row_vertex(&p->lattice, cell, finer));
+        const int finer = session_find_node_in_connectivity(&fine, INSITU_ORDER_LEXICOGRAPHIC, step * at[0],
+                                                            step * at[1], step * at[2]);
+        out[position] = grid_field_value(&p->of->values, session_find_vertex_of_node(&p->lattice, cell, finer));
     }
 }
 
@@ -100,7 +100,7 @@ static void read_values(const order_pass *p, const session_interpolation *nodes,
         read_lattice_values(p, nodes, cell, out);
     } else {
         for (int n = 0; n < count; n++)
-            out[n] = grid_field_value(&p->of->values, session_find_row_vertex(&p->lattice, cell, n));
+            out[n] = grid_field_value(&p->of->values, session_find_vertex_of_node(&p->lattice, cell, n));
     }
 }
 
@@ -116,12 +116,12 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
                                             order_buffer *buffer)
 {
     static const int32_t identity[GRID_MAX_CELL_VERTICES] = {0, 1, 2, 3, 4, 5, 6, 7};
-    const int64_t first = session_row_first(&p->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&p->rows, cell);
     double points[GRID_MAX_CELL_VERTICES][3] = {{0}}, values[GRID_MAX_CELL_VERTICES] = {0};
-    const int count = grid_type_vertices(nodes->of.type);
+    const int count = grid_type_vertex_count(nodes->of.type);
     read_values(p, nodes, cell, buffer->tuple, buffer->values);
     for (int c = 0; c < count; c++) {
-        grid_vertex(&p->rows.cells, session_row_vertex(&p->rows, first + nodes->corners[c]), points[c]);
+        grid_read_vertex_position(&p->rows.cells, session_row_vertex(&p->rows, first + nodes->corners[c]), points[c]);
         values[c] = buffer->values[nodes->corners[c]];
     }
     grid one = {.vertex_count = count, .cell_count = 1, .cell_type = nodes->of.type};
@@ -138,7 +138,7 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
 
 /* Returns whether integrals over the cell are computed as sums over its linear pieces, because its nodal functions are
  * not implemented. Such cells are never refined (session_finer.c). */
-static bool is_summed(const session_nodes *nodes)
+static bool is_integrated_over_pieces(const session_nodes *nodes)
 {
     return nodes->type == GRID_PYRAMID && nodes->order > INTERPOLATION_MOST_PYRAMID;
 }
@@ -205,7 +205,7 @@ typedef struct scaled_cell {
 static scaled_cell read_tuples(const order_pass *p, const session_interpolation *nodes, int64_t cell,
                                order_buffer *buffer)
 {
-    const int64_t first = session_row_first(&p->rows, cell);
+    const int64_t first = session_find_first_entry_of_cell(&p->rows, cell);
     scaled_cell out = {true, INFINITY, -INFINITY, 1};
     double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     read_values(p, nodes, cell, buffer->tuple, buffer->values);
@@ -215,7 +215,7 @@ static scaled_cell read_tuples(const order_pass *p, const session_interpolation 
         out.is_finite = out.is_finite && isfinite(value);
         out.minimum = fmin(out.minimum, value);
         out.maximum = fmax(out.maximum, value);
-        grid_vertex(&p->rows.cells, session_row_vertex(&p->rows, first + n), tuple);
+        grid_read_vertex_position(&p->rows.cells, session_row_vertex(&p->rows, first + n), tuple);
         for (int x = 0; x < 3; x++) {
             lower[x] = fmin(lower[x], tuple[x]);
             upper[x] = fmax(upper[x], tuple[x]);
@@ -237,7 +237,7 @@ static session_cell_value integrate_cell(const order_pass *p, const session_cell
                               .maximum = scaled.maximum};
     cell_integrals sums = {0};
     if (!scaled.is_finite) return out;
-    session_visit_cell(rules, buffer->tuples, buffer->work, add_integrals, &sums);
+    session_visit_quadrature_points(rules, buffer->tuples, buffer->work, add_integrals, &sums);
     const double mean = sums.volume != 0 ? sums.first / sums.volume : 0;
     const double variance = sums.volume != 0 ? sums.second / sums.volume - mean * mean : 0;
     out.volume = fabs(sums.volume);
@@ -255,7 +255,7 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
     if (grid_is_ghost(&p->rows.cells, cell) ||
         !grid_has_finite_cell_value(&p->of->values, session_first_piece(p->of->mesh, cell)))
         return (session_cell_value){.is_counted = false};
-    if (is_summed(nodes)) return sum_pieces(p, cell, buffer);
+    if (is_integrated_over_pieces(nodes)) return sum_pieces(p, cell, buffer);
     if (nodes->order == 1) return find_linear_value(p, &p->rules[kind].nodes, cell, buffer);
     return integrate_cell(p, &p->rules[kind], cell, buffer);
 }
@@ -275,7 +275,7 @@ typedef struct cell_bins {
 static void bin_volume(cell_bins *out, double value, double volume)
 {
     const session_bins *bins = &out->binned->bins;
-    const int bin = out->binned->is_whole ? find_bin_within(bins, value) : find_bin(bins, value);
+    const int bin = out->binned->is_whole ? find_nearest_bin(bins, value) : find_bin(bins, value);
     out->total += volume;
     if (bin >= 0) out->volumes[bin] += volume;
 }
@@ -303,11 +303,11 @@ static void bin_cell(const order_pass *p, int64_t cell, order_buffer *buffer, in
     const int kind = session_find_kind_of_cell(&p->rows, cell);
     if (!value->is_counted || !value->is_integral || value->is_shell != binned->is_of_shells) return;
     cell_bins own = {.binned = binned, .minimum = value->minimum, .maximum = value->maximum};
-    if (is_summed(&p->rows.kinds[kind].nodes)) {
+    if (is_integrated_over_pieces(&p->rows.kinds[kind].nodes)) {
         bin_pieces(p, cell, buffer, &own);
     } else {
         read_tuples(p, &p->rules[kind].nodes, cell, buffer);
-        session_visit_cell(&p->rules[kind], buffer->tuples, buffer->work, bin_points, &own);
+        session_visit_quadrature_points(&p->rules[kind], buffer->tuples, buffer->work, bin_points, &own);
     }
     const double scale = binned->largest > 0 ? (own.total < 0 ? -1 : 1) / binned->largest : 0;
     for (int bin = 0; bin < binned->bins.count; bin++)
@@ -320,13 +320,13 @@ static bool begin_pass(order_pass *p)
 {
     const session_mesh *mesh = p->of->mesh;
     bool is_made = true;
-    p->rows = session_describe_caller_rows(session_nodal_mesh(mesh));
+    p->rows = session_describe_caller_rows(session_get_mesh_of_caller_nodes(mesh));
     p->lattice = session_describe_rows(mesh);
-    session_list_kinds(&p->rows);
+    session_list_cell_kinds(&p->rows);
     for (int i = 0; i < p->rows.kind_count && is_made; i++) {
         const session_nodes *nodes = &p->rows.kinds[i].nodes;
-        const insitu_vertex_order order = session_nodal_mesh(mesh)->vertex_order;
-        if (is_summed(nodes)) continue;
+        const insitu_vertex_order order = session_get_mesh_of_caller_nodes(mesh)->vertex_order;
+        if (is_integrated_over_pieces(nodes)) continue;
         is_made = nodes->order == 1 ? session_map_nodes_to_connectivity(nodes, order, &p->rules[i].nodes)
                                     : session_make_cell_rules(nodes, order, p->of->is_lobatto, &p->rules[i]);
     }
@@ -395,32 +395,33 @@ static insitu_status run_pass(void *of, const session_node_values *values, base_
                      p->of->mesh->label);
 }
 
-int session_find_caller_nodes(const session_mesh *mesh, int field)
+int session_find_field_with_caller_nodes(const session_mesh *mesh, int field)
 {
     const session_field *of = &mesh->fields[field];
     return mesh->source || of->is_derived || of->given.centring == INSITU_CELL ? -1 : field;
 }
 
 /* Runs the pass with the caller's values at nodes or, if they cannot be read, with the session's values. */
-static insitu_status visit_field(order_pass *p, base_error *error)
+static insitu_status run_pass_with_caller_values(order_pass *p, base_error *error)
 {
     if (p->of->given < 0) return run_pass(p, NULL, error);
-    return session_read_nodes(p->of->mesh, p->of->given, run_pass, p, error);
+    return session_pass_node_values(p->of->mesh, p->of->given, run_pass, p, error);
 }
 
-insitu_status session_find_order_values(const session_order_field *of, session_cell_value **out, base_error *error)
+insitu_status session_compute_higher_order_cell_values(const session_order_field *of, session_cell_value **out,
+                                                       base_error *error)
 {
     const int64_t cells = session_count_whole_cells(of->mesh);
     *out = base_calloc((size_t)cells + 1, sizeof **out);
     if (!*out)
         return session_fail_for_memory(error, cells * (int64_t)sizeof **out, "integrals over cells of higher order");
     order_pass p = {.of = of, .out = *out};
-    return visit_field(&p, error);
+    return run_pass_with_caller_values(&p, error);
 }
 
-insitu_status session_bin_order_values(const session_order_field *of, const session_cell_value *cells,
-                                       const session_binned_volumes *out, base_error *error)
+insitu_status session_add_higher_order_cells_to_bins(const session_order_field *of, const session_cell_value *cells,
+                                                     const session_binned_volumes *out, base_error *error)
 {
     order_pass p = {.of = of, .binned = out, .cells = cells};
-    return visit_field(&p, error);
+    return run_pass_with_caller_values(&p, error);
 }

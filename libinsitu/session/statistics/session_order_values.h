@@ -20,10 +20,11 @@ typedef struct session_order_field {
 
 /* Returns the index of a mesh's field if its values at the caller's nodes can be read (session_order_field.given);
  * returns -1 if the field is derived, has values in cells, or belongs to a mirror image. */
-int session_find_caller_nodes(const session_mesh *mesh, int field);
+int session_find_field_with_caller_nodes(const session_mesh *mesh, int field);
 
 /* Computes the value of each of the caller's cells. The caller must free *out in any case. Parallel. Local. */
-insitu_status session_find_order_values(const session_order_field *of, session_cell_value **out, base_error *error);
+insitu_status session_compute_higher_order_cell_values(const session_order_field *of, session_cell_value **out,
+                                                       base_error *error);
 
 /* The volumes that cells have in the bins of a histogram. */
 typedef struct session_binned_volumes {
@@ -36,8 +37,9 @@ typedef struct session_binned_volumes {
 } session_binned_volumes;
 
 /* Adds the volumes of cells to the bins in out->sums. Only cells in which the value varies are added
- * (session_cell_value.is_integral). cells: the values from session_find_order_values(). Parallel. Local. */
-insitu_status session_bin_order_values(const session_order_field *of, const session_cell_value *cells,
-                                       const session_binned_volumes *out, base_error *error);
+ * (session_cell_value.is_integral). cells: the values from session_compute_higher_order_cell_values(). Parallel. Local.
+ */
+insitu_status session_add_higher_order_cells_to_bins(const session_order_field *of, const session_cell_value *cells,
+                                                     const session_binned_volumes *out, base_error *error);
 
 #endif

@@ -28,7 +28,7 @@ static double evaluate_jacobi_polynomial(int n, int alpha, double x, double *slo
 
 /* Finds the Gauss-Jacobi rule on the line from 0 to 1 with the weight function (1 - x)^alpha. The points are found by
  * Newton's method. The polynomial is divided by the factors of roots found before, so that no root is found twice. */
-static void find_line_rule(int count, int alpha, double *points, double *weights)
+static void compute_gauss_jacobi_rule(int count, int alpha, double *points, double *weights)
 {
     double roots[QUADRATURE_MOST_POINTS], slope = 1;
     for (int i = 0; i < count; i++) {
@@ -55,7 +55,7 @@ bool session_make_quadrature(int dimensions, int per_axis, session_quadrature *o
     int counts[3] = {1, 1, 1};
     *out = (session_quadrature){.dimensions = dimensions, .count = 1};
     for (int axis = 0; axis < dimensions; axis++) {
-        find_line_rule(per_axis, axis, x[axis], w[axis]);
+        compute_gauss_jacobi_rule(per_axis, axis, x[axis], w[axis]);
         counts[axis] = per_axis;
         out->count *= per_axis;
     }

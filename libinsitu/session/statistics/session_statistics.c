@@ -41,16 +41,16 @@ typedef struct sum_basis {
 static double find_position_of_mean(const session_statistics *s, const session_cell_value *cell)
 {
     static const double most = 1024;
-    if (!cell->is_integral) return share_of_range(cell->mean, s->minimum, s->maximum);
+    if (!cell->is_integral) return clamped_position_in_range(cell->mean, s->minimum, s->maximum);
     return fmin(fmax(position_in_range(cell->mean, s->minimum, s->maximum), -most), most);
 }
 
-static session_bins bins_of(const session_statistics *s)
+static session_bins get_bins_of_statistics(const session_statistics *s)
 {
     return (session_bins){s->bin_count, s->low, s->high};
 }
 
-static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t *sums)
+static void add_cell_value_to_sums(const sum_basis *b, const session_cell_value *cell, int64_t *sums)
 {
     const session_statistics *s = b->first_pass;
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
@@ -64,7 +64,7 @@ static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t
     }
     add_fixed_point(sums + VOLUME, volume);
     add_fixed_point(sums + MOMENT, volume * place);
-    const session_bins bins = bins_of(s);
+    const session_bins bins = get_bins_of_statistics(s);
     const int bin = bins.count && !cell->is_integral ? find_bin(&bins, cell->mean) : -1;
     if (bin >= 0) add_fixed_point(sums + BINS + 2 * bin, volume);
 }
@@ -89,11 +89,11 @@ static void add_counted_cell(const statistics_pass *p, const sum_basis *b, int64
 {
     const session_cell_value value = find_cell_value(p, cell);
     if (!value.is_counted || value.is_shell != b->is_of_shells) return;
-    add_cell(b, &value, sums);
+    add_cell_value_to_sums(b, &value, sums);
     if (!b->is_second) sums[0]++;
 }
 
-static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
+static void add_all_cells_to_sums(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
     const int64_t cells = session_count_whole_cells(p->mesh);
 #pragma omp parallel num_threads(session_choose_loop_threads(p->team->threads, cells))
@@ -152,7 +152,7 @@ typedef struct statistics_work {
     volume_buffer *buffers;
 } statistics_work;
 
-static session_cell_value **find_order_values(const statistics_work *w, int request, int mesh)
+static session_cell_value **get_order_values_of_request(const statistics_work *w, int request, int mesh)
 {
     return &w->order_values[request * w->meshes->count + mesh];
 }
@@ -164,7 +164,7 @@ static bool fill_statistics_pass(const statistics_work *w, int request, int mesh
     const session_mesh *of = w->meshes->items[mesh];
     *pass = (statistics_pass){.mesh = of,
                               .g = &of->cells,
-                              .cells = *find_order_values(w, request, mesh),
+                              .cells = *get_order_values_of_request(w, request, mesh),
                               .team = w->team,
                               .buffers = w->buffers};
     return of->is_given && !of->source && session_find_values(of, w->requests[request].field, &pass->field);
@@ -176,31 +176,34 @@ static session_order_field describe_order_field(const statistics_work *w, int re
     const scene_field *field = w->requests[request].field;
     session_order_field out = {.mesh = of, .is_lobatto = w->are_lobatto[mesh], .threads = w->team->threads};
     session_find_values(of, field, &out.values);
-    out.given = session_find_caller_nodes(of, session_find_field(of, field->name));
+    out.given = session_find_field_with_caller_nodes(of, session_find_field(of, field->name));
     return out;
 }
 
 /* Computes the values of the caller's cells if the mesh has cells of higher order. */
-static void make_order_values(const statistics_work *w, int request, int mesh, statistics_pass *pass, base_error *error)
+static void compute_order_values_of_request(const statistics_work *w, int request, int mesh, statistics_pass *pass,
+                                            base_error *error)
 {
-    session_cell_value **values = find_order_values(w, request, mesh);
+    session_cell_value **values = get_order_values_of_request(w, request, mesh);
     const session_order_field of = describe_order_field(w, request, mesh);
-    if (of.mesh->topology.is_split && !error->status) session_find_order_values(&of, values, error);
+    if (of.mesh->topology.is_split && !error->status) session_compute_higher_order_cell_values(&of, values, error);
     pass->cells = *values;
 }
 
 /* Adds the volumes of cells of higher order to the bins of the histogram. */
-static void add_order_bins(const statistics_work *w, int request, int mesh, const sum_basis *basis, base_error *error)
+static void add_higher_order_volumes_to_bins(const statistics_work *w, int request, int mesh, const sum_basis *basis,
+                                             base_error *error)
 {
     const session_statistics_request *of = &w->requests[request];
     const session_order_field field = describe_order_field(w, request, mesh);
-    const session_binned_volumes binned = {.bins = bins_of(basis->first_pass),
+    const session_binned_volumes binned = {.bins = get_bins_of_statistics(basis->first_pass),
                                            .is_whole = of->low > of->high,
                                            .is_of_shells = basis->is_of_shells,
                                            .largest = basis->largest,
                                            .sums = w->sums + (ptrdiff_t)MAX_SUMS * request + BINS};
-    const session_cell_value *values = *find_order_values(w, request, mesh);
-    if (values && binned.bins.count && !error->status) session_bin_order_values(&field, values, &binned, error);
+    const session_cell_value *values = *get_order_values_of_request(w, request, mesh);
+    if (values && binned.bins.count && !error->status)
+        session_add_higher_order_cells_to_bins(&field, values, &binned, error);
 }
 
 /* Stores an error if memory ran out on any rank. */
@@ -235,7 +238,7 @@ static insitu_status reduce_extremes(const statistics_work *w, base_error *error
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (!fill_statistics_pass(w, i, m, &pass)) continue;
-            make_order_values(w, i, m, &pass, error);
+            compute_order_values_of_request(w, i, m, &pass, error);
             if (!error->status) find_extremes(&pass, ends);
         }
     }
@@ -260,8 +263,8 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (!fill_statistics_pass(w, i, m, &pass)) continue;
-            add_cells(&pass, &basis, w->sums + size * i, size);
-            if (!is_second) add_order_bins(w, i, m, &basis, error);
+            add_all_cells_to_sums(&pass, &basis, w->sums + size * i, size);
+            if (!is_second) add_higher_order_volumes_to_bins(w, i, m, &basis, error);
         }
     }
     w->sums[all] = error->status != INSITU_OK;
@@ -309,8 +312,8 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
 
 /* Finds the meshes in which nodes of cells of higher order are Gauss-Lobatto points, by the rule of
  * session_count_higher_order_cells() (session_finer.h). Collective. */
-static insitu_status find_spacings(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
-                                   bool *are_lobatto, base_error *error)
+static insitu_status find_meshes_with_lobatto_nodes(session_meshes *meshes, const session_catalogue *catalogue,
+                                                    MPI_Comm comm, bool *are_lobatto, base_error *error)
 {
     if (!session_catalogue_has_higher_order(catalogue)) return INSITU_OK;
     session_finer_choice *choices = base_calloc((size_t)catalogue->mesh_count, sizeof *choices);
@@ -350,7 +353,7 @@ insitu_status session_find_statistics(session_meshes *meshes, const session_cata
     if (!work.extremes || !work.sums || !work.buffers || !work.are_lobatto || !work.order_values)
         session_fail_for_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = find_spacings(meshes, catalogue, team->comm, work.are_lobatto, error);
+    if (!status) status = find_meshes_with_lobatto_nodes(meshes, catalogue, team->comm, work.are_lobatto, error);
     if (!status) status = find_all_statistics(&work, out, error);
     free_work(&work);
     return status;

@@ -86,7 +86,7 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
 }
 
 /* Writes a line to a file to which this session has not written yet, or which was removed since. */
-static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
+static insitu_status rewrite_file_with_kept_lines(const char *path, new_lines *lines, base_error *error)
 {
     file_content old;
     file_failure failure;
@@ -114,7 +114,7 @@ insitu_status session_write_statistics(const char *path, bool is_first, int64_t 
     char *header = make_header(values->bin_count, values->is_of_shells);
     if (!header) return session_fail_for_memory(error, 1 << 12, "a line of statistics");
     lines.header = header;
-    const insitu_status status = begin_file(path, &lines, error);
+    const insitu_status status = rewrite_file_with_kept_lines(path, &lines, error);
     base_free(header);
     return status;
 }

@@ -40,15 +40,15 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     for (int i = 0; i < count; i++) {
         /* position of the vertex in the cell's part of the caller's connectivity */
         const int given = other ? other[i] : i;
-        grid_vertex(&mesh->cells, vertices[read ? read[given] : given], points[i]);
+        grid_read_vertex_position(&mesh->cells, vertices[read ? read[given] : given], points[i]);
     }
-    return !tally_has_both_signs(type, points);
+    return !tally_has_corners_of_both_signs(type, points);
 }
 
 /* Returns the counts for cells of this cell's type. Returns NULL if the cell is not counted, because its type has only
  * one vertex order, because it is a ghost, or because the caller gave it as a polyhedron, whose faces determine the
  * order. */
-static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
+static int64_t *get_counts_of_cell_type(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
     int at = 0;
@@ -64,7 +64,7 @@ static void count_fitting_orders(const session_mesh *mesh, int part_count, int64
     const int64_t samples = (SAMPLES + part_count - 1) / part_count, step = mesh->cells.cell_count / samples + 1;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
         const int type = grid_cell_type(&mesh->cells, cell);
-        int64_t *of_type = find_type_sums(mesh, cell, sums);
+        int64_t *of_type = get_counts_of_cell_type(mesh, cell, sums);
         if (!of_type) continue;
         of_type[SAMPLED]++;
         of_type[BOTH_SIGNS] += !fits_order(mesh, cell, type, mesh->given.vertex_order);
@@ -73,7 +73,7 @@ static void count_fitting_orders(const session_mesh *mesh, int part_count, int64
     }
 }
 
-static void sum_cells(const session_meshes *meshes, const char *name, int threads, int64_t sums[CELL_SUMS])
+static void count_cells_of_mesh(const session_meshes *meshes, const char *name, int threads, int64_t sums[CELL_SUMS])
 {
     const session_parts parts = session_find_parts(meshes, name);
     for (int i = 0; i < parts.count; i++) {
@@ -92,7 +92,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int thread
 }
 
 /* Returns whether, for some type, most sampled cells have corner volumes of both signs. */
-static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
+static bool has_any_type_mixed_signs(const int64_t sums[CELL_SUMS])
 {
     bool is_any = false;
     for (const int64_t *t = sums + OF_TYPES; t < sums + CELL_SUMS; t += TYPE_SUMS)
@@ -122,12 +122,12 @@ static int find_fitting_order(const int64_t sums[CELL_SUMS])
 
 /* Warns if most sampled cells of some type have corner volumes of both signs. The warning names the vertex order with
  * which most cells have a single sign, if there is one. Returns whether a warning was due. */
-static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
+static bool warn_of_mixed_corner_signs(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};
     static const char *const names[] = {"INSITU_ORDER_VTK", "INSITU_ORDER_LEXICOGRAPHIC", "INSITU_ORDER_DMPLEX"};
     const session_warning warning = {WARNING_ORDER, NULL, mesh, 0};
-    const bool are_turned = is_any_type_inverted(sums);
+    const bool are_turned = has_any_type_mixed_signs(sums);
     const int order = find_fitting_order(sums);
     if (order >= 0)
         session_warn(
@@ -149,7 +149,7 @@ static bool warn_of_corners(session_report *report, const char *mesh, const int6
 static void warn_of_order(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     const long long drawn = sums[DRAWN], flat = sums[FLAT], inverted = sums[INVERTED];
-    const bool are_turned = warn_of_corners(report, mesh, sums);
+    const bool are_turned = warn_of_mixed_corner_signs(report, mesh, sums);
     const bool are_flat = !are_turned && 2 * flat > drawn;
     const bool are_inverted = !are_turned && 2 * inverted > drawn;
     session_warn(report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
@@ -171,7 +171,7 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, session_c
     if (!sums) session_fail_for_memory(error, (int64_t)(words * sizeof *sums), "counts of cells");
     insitu_status status = session_agree(team->comm, error);
     for (int m = 0; m < catalogue->mesh_count && !status; m++)
-        sum_cells(meshes, catalogue->meshes[m].name, team->threads, sums + m * CELL_SUMS);
+        count_cells_of_mesh(meshes, catalogue->meshes[m].name, team->threads, sums + m * CELL_SUMS);
     if (!status)
         status = session_check_mpi(
             error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, team->comm), "MPI_Allreduce");

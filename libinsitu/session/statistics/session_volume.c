@@ -83,9 +83,9 @@ static bool reserve_bytes(volume_buffer *buffer, size_t size)
 static void read_positions(const grid *g, const closed_faces *c, double (*positions)[3])
 {
     double origin[3];
-    grid_vertex(g, c->vertices[0], origin);
+    grid_read_vertex_position(g, c->vertices[0], origin);
     for (int i = 0; i < c->vertex_count; i++) {
-        grid_vertex(g, c->vertices[i], positions[i]);
+        grid_read_vertex_position(g, c->vertices[i], positions[i]);
         for (int axis = 0; axis < 3; axis++) positions[i][axis] -= origin[axis];
     }
 }
@@ -101,7 +101,7 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *buff
 {
     static const double origin[3] = {0, 0, 0};
     closed_faces c = {0};
-    if (!closed_faces_count(&c, g, cell)) return NAN;
+    if (!closed_faces_count_entries(&c, g, cell)) return NAN;
     const size_t bytes = 3 * (size_t)c.entry_count * sizeof(double);
     if (!reserve_bytes(buffer, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
     double(*places)[3] = (double(*)[3])(void *)(buffer->bytes + closed_faces_lay_out(&c, buffer->bytes));
@@ -116,9 +116,9 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *buff
     closed_faces_orient_outward(&c, positions, origin);
     double volume = 0;
     for (int i = 0; i < c.triangle_count; i++)
-        if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
+        if (!closed_face_is_bilinear_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
     for (int face = 0; face < c.face_count; face++)
-        if (closed_face_is_patch(&c, face, positions))
+        if (closed_face_is_bilinear_patch(&c, face, positions))
             volume +=
                 c.orientation[face] * compute_patch_cone_volume(positions, c.entry_vertices + c.first_entries[face]);
     return fabs(volume) / 6;
@@ -148,10 +148,10 @@ double session_shell_area(const grid *g, int64_t cell)
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
     if (!grid_walk_next(&walk, &vertex)) return 0;
-    grid_vertex(g, vertex, first);
+    grid_read_vertex_position(g, vertex, first);
     while (grid_walk_next(&walk, &vertex)) {
         double place[3], next[3];
-        grid_vertex(g, vertex, place);
+        grid_read_vertex_position(g, vertex, place);
         subtract_vectors(place, first, next);
         for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
@@ -171,6 +171,6 @@ double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer)
     if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, buffer);
     buffer->vertices = buffer->corners;
     buffer->vertex_count = grid_cell_vertices(g, cell, buffer->corners);
-    for (int i = 0; i < buffer->vertex_count; i++) grid_vertex(g, buffer->corners[i], points[i]);
+    for (int i = 0; i < buffer->vertex_count; i++) grid_read_vertex_position(g, buffer->corners[i], points[i]);
     return fabs(type == GRID_TET ? tet_volume(points) : hex_volume(points, find_corners_as_hex(type)));
 }

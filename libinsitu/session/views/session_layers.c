@@ -113,7 +113,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
         const session_mesh *mesh = walk.part;
         if (!has_tree_to_draw(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
-        if (scalar && plane) scalar = session_find_distance(mesh, plane);
+        if (scalar && plane) scalar = session_find_distance_scalar(mesh, plane);
         set_scalar_field(layers, at++, mesh, scalar, needs_ranges);
     }
     return out;
@@ -246,7 +246,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_is_surface_on_mesh(layer, walk->whole) &&
-           session_find_outer(walk->whole, &layer->threshold) == walk->outer;
+           session_find_outer_surface(walk->whole, &layer->threshold) == walk->outer;
 }
 
 static render_field set_face_field(const session_meshes *meshes, session_layers *layers, int slot,

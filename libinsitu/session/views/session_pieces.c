@@ -72,7 +72,8 @@ static insitu_status apply_request(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
-    if (!work->pieces) return session_measure_deviation(work->mesh, &work->request, threads, &w->out->all, error);
+    if (!work->pieces)
+        return session_measure_linearization_error(work->mesh, &work->request, threads, &w->out->all, error);
     return session_add_crossed_pieces(work->mesh, &work->request, w->choice->parts, threads, work->pieces, error);
 }
 
@@ -101,7 +102,7 @@ static void apply_error_request_to_part(part_work *work, const session_error_req
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
     const int field = request->field ? session_find_field(work->mesh, request->field) : -1;
     if (!request->field) apply_request(work, error);
-    if (field >= 0) session_read_nodes(work->mesh, field, use_values, work, error);
+    if (field >= 0) session_pass_node_values(work->mesh, field, use_values, work, error);
 }
 
 static void measure_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
@@ -114,7 +115,7 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
         if (request->is_shown && !request->volume && (!w->marks_only || marks))
             apply_error_request_to_part(&work, request, error);
     }
-    for (int64_t cell = 0; work.request.measured && cell < session_nodal_mesh(mesh)->cell_count; cell++)
+    for (int64_t cell = 0; work.request.measured && cell < session_get_mesh_of_caller_nodes(mesh)->cell_count; cell++)
         if (work.request.measured[cell]) cells[cell] = 1;
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
@@ -186,7 +187,7 @@ static void fill_fields(const session_pieces_basis *basis, const session_due_vie
             session_mark_field_for_statistics(basis->meshes, &image->volumes[layer].field);
     }
     session_fill_fields(basis->meshes, basis->catalogue, false, &unheard);
-    session_clear_requested_fields(basis->meshes);
+    session_clear_statistics_marks(basis->meshes);
 }
 
 /* Values of one mesh that are summed over the ranks. cell_count: number of cells that isosurfaces may cross;

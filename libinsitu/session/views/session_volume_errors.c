@@ -127,7 +127,7 @@ static insitu_status extend_range(void *of, const session_node_values *values, b
     };
     session_deviation own = {.low = INFINITY, .high = -INFINITY};
     if (request.component < 0) return INSITU_OK;
-    session_measure_deviation(work->mesh, &request, work->threads, &own, error);
+    session_measure_linearization_error(work->mesh, &request, work->threads, &own, error);
     work->range->minus_low = fmax(work->range->minus_low, -own.low);
     work->range->high = fmax(work->range->high, own.high);
     return error->status;
@@ -139,7 +139,7 @@ static void find_own_range(const session_meshes *meshes, int threads, session_va
         range_work work = {meshes->items[m], threads, range};
         const bool is_shown = scene_field_selects_mesh(range->field, work.mesh->label);
         const int field = is_shown ? session_find_field(work.mesh, range->field->name) : -1;
-        if (field >= 0 && !work.mesh->source) session_read_nodes(work.mesh, field, extend_range, &work, error);
+        if (field >= 0 && !work.mesh->source) session_pass_node_values(work.mesh, field, extend_range, &work, error);
     }
 }
 
@@ -427,7 +427,7 @@ static insitu_status add_cells(void *of, const session_node_values *values, base
                                                .of_values = work->errors,
                                                .is_lobatto = work->is_lobatto};
     session_deviation unused = {.low = INFINITY, .high = -INFINITY};
-    return session_measure_deviation(work->mesh, &request, work->threads, &unused, error);
+    return session_measure_linearization_error(work->mesh, &request, work->threads, &unused, error);
 }
 
 insitu_status session_estimate_volume_error(const session_error_request *request, const session_value_ranges *ranges,
@@ -439,7 +439,7 @@ insitu_status session_estimate_volume_error(const session_error_request *request
     for (int i = 0; i < parts->count && !error->status; i++) {
         estimate_work work = {parts->items[i], team->threads, is_lobatto, &errors};
         const int field = session_find_field(work.mesh, request->field);
-        if (work.mesh->is_given && field >= 0) session_read_nodes(work.mesh, field, add_cells, &work, error);
+        if (work.mesh->is_given && field >= 0) session_pass_node_values(work.mesh, field, add_cells, &work, error);
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status)
