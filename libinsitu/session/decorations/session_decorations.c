@@ -11,7 +11,7 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* ---- the box ------------------------------------------------------------------------------------------------- */
+/* ---- edges of a box ------------------------------------------------------------------------------------------ */
 
 /* A point in the camera's coordinate system, relative to the eye: x to the right, y up, z forward. */
 typedef struct seen_point {
@@ -36,7 +36,8 @@ static void project_to_pixel(const render_camera *c, const seen_point *p, double
     pixel[1] = 0.5 * c->height - p->position[1] * scale;
 }
 
-/* Clips the edge from a to b at the plane z = near (seen_point). Returns false if the whole edge is nearer. */
+/* Clips the edge from a to b at the near plane, which is at z = near in camera coordinates. Returns false if the whole
+ * edge is nearer to the eye than this plane. */
 static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 {
     if (a->position[2] < near && b->position[2] < near) return false;
@@ -82,11 +83,11 @@ int session_compute_box_strokes(const double lower[3], const double upper[3], co
     return count;
 }
 
-/* ---- rulers -------------------------------------------------------------------------------------------------- */
+/* ---- rulers: ticks and numbers along edges of the box -------------------------------------------------------- */
 
 /* An edge of the box parallel to an axis, and its projection into the picture. */
 typedef struct ruled_edge {
-    double from[3], to[3]; /* the ends in scene coordinates */
+    double from[3], to[3]; /* ends of the edge in scene coordinates */
     double pixels[2][2];   /* ends of the edge in pixels */
     double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
     /* is_in_front: the edge and the box's centre lie in front of the eye, and the edge is longer than a pixel;
@@ -137,9 +138,9 @@ static insitu_label make_label(const double at[2], const double away[2], double 
     return out;
 }
 
-/* Computes the position of an axis's name: the middle of the edge. If the numbers are beside the edge rather than below
- * it, the name is instead placed between the two neighbouring ticks nearest to the middle, so that it does not overlap
- * a number. */
+/* Computes the position of the name of the edge's axis. It is the middle of the edge or, if the numbers are beside the
+ * edge rather than below it, midway between the two neighbouring ticks that are nearest to the middle, so that the name
+ * does not overlap a number. */
 static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
 {
     double middle[2], least = INFINITY;
@@ -211,7 +212,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
     return out;
 }
 
-/* ---- texts and bars ------------------------------------------------------------------------------------------ */
+/* ---- texts and colour bars ----------------------------------------------------------------------------------- */
 
 /* Chooses the colour of text: light on a dark background, and dark on a light or transparent one. */
 static void choose_text_colour(const scene_image *image, float colour[3])
@@ -241,8 +242,8 @@ static bool add_scene_texts(session_decorations *d, const scene_decorations *sce
     return well;
 }
 
-/* Returns whether the layer shows the magnitude of the field: the scene requests it, or the scene requests neither it
- * nor a component, and the field has several components. */
+/* Returns whether the layer shows the magnitude of the field. This is the case if the scene requests the magnitude, or
+ * if the scene requests neither the magnitude nor a component and the field has several components. */
 static bool shows_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
     int components = 1;

@@ -16,15 +16,16 @@ enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
 enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 * SESSION_MAX_TICKS + 3 };
 
 typedef struct session_decorations {
-    /* all decorations; its pointers refer to members of this struct and to the layers */
+    /* all decorations; pointers in it refer to members of this struct and to tables of colours in the scene */
     insitu_decorations decorations;
-    insitu_decorations background;            /* only the background, for files without other decorations */
-    insitu_words words[SESSION_MAX_WORDS];    /* the title, if there is one, followed by the scene's other texts */
-    insitu_colour_bar bars[SESSION_MAX_BARS]; /* one colour bar per field, colours and ticks that layers show */
+    insitu_decorations background;         /* only the background, for files without other decorations */
+    insitu_words words[SESSION_MAX_WORDS]; /* the title, if there is one, followed by the scene's other texts */
+    /* the colour bars; layers with the same field, colours and ticks share a bar */
+    insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];          /* label of each colour bar */
     const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the colour bars show */
-    /* buffers for the boxes of the outline and for the lines of the rulers */
+    /* line segments: the edges of all boxes of the outline, followed by the ticks of the rulers */
     insitu_stroke *strokes;
     insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and axis names along the rulers */
     uint64_t bars_hash; /* hash of the labels, colours and ticks of the colour bars; equal bars have equal hashes */
@@ -40,11 +41,11 @@ typedef struct session_decoration_basis {
     const session_catalogue *catalogue;
 } session_decoration_basis;
 
-/* Returns the decorations of an image. The scene must request some for this image. Returns NULL if memory runs out.
- * Local. */
+/* Returns the decorations of an image for which the scene requests decorations. Returns NULL if memory runs out. Local.
+ */
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
 
-/* Returns a copy of the decorations. Both refer to the same scene. Returns NULL if memory runs out. Local. */
+/* Returns a copy of the decorations, which refers to the same scene. Returns NULL if memory runs out. Local. */
 session_decorations *session_copy_decorations(const session_decorations *from);
 
 /* Frees the decorations. decorations may be NULL. */
@@ -60,8 +61,9 @@ int session_compute_box_strokes(const double lower[3], const double upper[3], co
 void session_add_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                             insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 
-/* Returns a scale bar. Its length is a round number of scene units that, at the distance of `point` along the camera's
- * axis, appears as at most a fifth of the picture's width. unit may be NULL. Local. */
+/* Returns a scale bar. Its length is a round number of scene units (1, 2 or 5 times a power of ten). Drawn at the depth
+ * of `point`, it spans at most a fifth of the picture's width. unit: unit of length for the bar's label, or NULL.
+ * Local. */
 insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit);
 
 #endif

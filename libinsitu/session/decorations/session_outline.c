@@ -64,7 +64,7 @@ static insitu_status gather_bounds(const session_catalogue *catalogue, const ses
                              "MPI_Allreduce");
 }
 
-/* ---- all boxes ------------------------------------------------------------------------------------------------- */
+/* ---- boxes of all meshes or ranks ------------------------------------------------------------------------------ */
 
 /* Allocates the boxes. Called on rank 0 only. */
 static bool allocate_boxes(session_outline *out, int count)

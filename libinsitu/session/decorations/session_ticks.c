@@ -50,7 +50,7 @@ static void shorten_exponent(char *text)
     if (!e) return;
     const bool is_negative = e[1] == '-';
     const size_t zeros = strspn(e + 2, "0");
-    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of the exponent e+00 is kept */
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* keeps one digit of the exponent e+00 */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 
@@ -87,7 +87,7 @@ static double compute_position_on_scale(const session_scale *s, double value)
     return fmin(fmax((render_scaled(s->kind, s->threshold, value) - low) / (high - low), 0), 1);
 }
 
-/* ---- linear -------------------------------------------------------------------------------------------------- */
+/* ---- ticks on a linear scale --------------------------------------------------------------------------------- */
 
 static int fill_ticks_at_multiples(const session_scale *s, int most, insitu_tick *ticks)
 {
@@ -109,7 +109,7 @@ static int fill_ticks_at_multiples(const session_scale *s, int most, insitu_tick
     return count;
 }
 
-/* ---- logarithmic --------------------------------------------------------------------------------------------- */
+/* ---- ticks on a logarithmic scale ---------------------------------------------------------------------------- */
 
 /* The choice of values that get a tick on a logarithmic scale. These are powers of ten whose exponents are multiples of
  * `step`, and also 2 and 5 times these powers if has_2_and_5 is set. */
@@ -161,7 +161,7 @@ static int fill_decade_ticks(const session_scale *s, decade_choice choice, insit
     return count;
 }
 
-/* ---- all scales ------------------------------------------------------------------------------------------------ */
+/* ---- ticks on any scale ---------------------------------------------------------------------------------------- */
 
 static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
 {
@@ -172,10 +172,9 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_ticks_at_multiples(s, most, ticks) : count;
 }
 
-/* If the bands correspond to the integers in the range, adds one tick in the centre of each band, or of every n-th band
- * if there are many. The bands correspond to integers if the range begins and ends at integers, or half a band beyond
- * them. Returns the number of ticks; 0 if the bands do not
- * correspond to integers. */
+/* Adds a tick in the centre of each band (one of `bands` intervals of equal width), or of every n-th band if there are
+ * many. Does this only if each band corresponds to one integer: the range begins and ends at integers, or half a band
+ * beyond them. Returns the number of ticks; 0 if the bands do not correspond to integers. */
 static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;

@@ -1,5 +1,6 @@
-/* Defines constants for the vectorized code for cells: the corners from which a cell's volume is computed, and the
- * first approximation of the volume's cube root. This root is the cell's size. */
+/* Defines constants for the vectorized computation of cells' volumes and sizes: the corners from which a volume is
+ * computed, and the first approximation of its cube root. The cube root of a cell's volume is called the cell's size.
+ */
 #ifndef SESSION_CORNERS_H
 #define SESSION_CORNERS_H
 
@@ -12,14 +13,16 @@
 typedef struct cell_corners {
     const signed char (*corners)[4];
     int count; /* number of corners in the list */
-    /* sum over the listed corners for a cell of volume 1, which is the divisor in the formula above */
+    /* divisor in the formula above: the sum over the listed corners, of six times the volumes of the tets, for a cell
+     * of volume 1 */
     double volume_factor;
 } cell_corners;
 
-/* Constants of the first approximation of the cube root: a third of the upper 32 bits of the double, plus an offset.
- * Its relative error is at most 0.033, because a double's bits are its logarithm to within 0.09. A step of Halley's
- * method cubes the error; after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the
- * upper 32 bits of 1.0, less a correction for the mantissa. */
+/* Constants of the first approximation of a double's cube root. Its upper 32 bits are a third of the upper 32 bits of
+ * the double, plus an offset. Its relative error is at most 0.033, because the bits of a double, as an integer,
+ * approximate its base-2 logarithm to within 0.09. Each step of Halley's method roughly cubes the relative error, to
+ * 2.1e-5 after one step and 6.5e-15 after two. The offset is two thirds of the upper 32 bits of 1.0, less a correction
+ * for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
 static inline __attribute__((always_inline)) cell_corners find_cell_corners(int type)

@@ -1,11 +1,12 @@
-/* Defines the loops for one instruction set, in the table SESSION_LANES_TABLE. This file is compiled once per
- * instruction set (CMakeLists.txt).
+/* Defines the loops over cells (session_lanes.h) for one instruction set, in the table SESSION_LANES_TABLE. This file
+ * is compiled once per instruction set (CMakeLists.txt).
  *
  * A block of cells is processed in two passes. The first reads vertices and computes bounds and volumes, the second
  * computes sizes from the volumes. In a single pass a tet would take 5.8 ns instead of 4.0, because each cube root
- * depends on a volume, and the core's out-of-order window is too small to overlap this work with that on other
- * cells. Volumes are kept as sums over corners and sizes as the cube roots of these sums, so that the results are
- * divided only once, at the end. Numbers are loaded one by one, since gather instructions take 1.6 times as long. */
+ * depends on a volume, and the core's out-of-order window is too small to overlap this work with that on other cells.
+ * Instead of volumes and sizes, multiples of them are computed: sums over corners, and the cube roots of these sums.
+ * The divisions follow once, at the end. Numbers are loaded one by one, since gather instructions take 1.6 times as
+ * long. */
 #include <stdbool.h>
 
 #include "session_corners.h"
@@ -14,18 +15,19 @@
 
 enum {
     BLOCK_CELLS = 512,          /* number of cells of a block; their volumes fit into the first-level cache */
-    PARTS = LANES / LANE_WIDTH, /* number of vectors that contain one number for each of LANES cells */
+    PARTS = LANES / LANE_WIDTH, /* number of vectors that together hold one number for each of LANES cells */
     AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
 
 /* Addresses and strides of the mesh's arrays. They are constant during one call of a lane_run function. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    /* for each axis, the address of the coordinate with index 0, which is outside of the array if indices begin at 1 */
+    /* for each axis, the address of the coordinate of a vertex with index 0; if indices begin at 1, this address is
+     * outside of the array */
     uintptr_t axis_data[3];
     int64_t connectivity_stride, ghosts_stride, stride;
     int64_t least_index, greatest_index; /* smallest and largest valid vertex index in the connectivity */
-    int type, count;                     /* type of the cells, and their number of vertices */
+    int type, count;                     /* type of the cells, and number of vertices of each cell */
     int ghosts_bytes;                    /* size of a ghost flag in bytes */
     /* wide_index: indices have 8 bytes instead of 4; wide_number: coordinates have 8 bytes instead of 4 */
     bool wide_index, wide_number;
@@ -37,7 +39,7 @@ typedef struct lane_points {
     doubles wide[GRID_MAX_CELL_VERTICES][3];
 } lane_points;
 
-/* Bounds of vertex positions. Either the float members or the double members are used. */
+/* Bounds of vertex positions. The float members are used if coordinates are floats, otherwise the double members. */
 typedef struct lane_bounds {
     floats narrow_lower[3], narrow_upper[3];
     doubles lower[3], upper[3];
@@ -46,8 +48,8 @@ typedef struct lane_bounds {
 /* Results of one call of a lane_run function. Each lane of the vectors contains the results over the cells that this
  * lane has processed. */
 typedef struct lane_sizes {
-    doubles sums[PARTS];   /* sums of the cube roots of absolute volumes times the volume factor */
-    doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */
+    doubles sums[PARTS];   /* sums of the cube roots of (absolute volume × volume factor) */
+    doubles least;         /* smallest (absolute volume × volume factor); see cell_corners.volume_factor */
     words inverted_counts; /* negated number of cells with a negative volume */
 } lane_sizes;
 
@@ -91,15 +93,15 @@ LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type
     return s;
 }
 
-/* ---- vertices ------------------------------------------------------------------------------------------------ */
+/* ---- indices and positions of vertices ----------------------------------------------------------------------- */
 
 static __attribute__((noinline)) void pack_indices(const char *from, int64_t stride, int count, int64_t size, char *out)
 {
     for (int i = 0; i < count; i++) memcpy(out + i * size, from + i * stride, (size_t)size);
 }
 
-/* Returns a pointer to the indices of LANES cells, without gaps. It points into the connectivity if they are contiguous
- * there, and otherwise to `buffer`, into which they are copied. */
+/* Returns a pointer to the vertex indices of LANES cells, without gaps. If they are contiguous in the connectivity, the
+ * result points into it, and otherwise to `buffer`, into which they are copied. */
 LANE_INLINE const char *load_indices(const lane_source *s, int64_t cell, int64_t buffer[LANES * GRID_MAX_CELL_VERTICES])
 {
     const char *from = s->connectivity + cell * s->count * s->connectivity_stride;
@@ -255,7 +257,7 @@ LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t
     return cell;
 }
 
-/* ---- sizes --------------------------------------------------------------------------------------------------- */
+/* ---- sizes of cells (cube roots of volumes) ------------------------------------------------------------------ */
 
 LANE_INLINE doubles cube_root(doubles x)
 {
@@ -288,7 +290,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
     return true;
 }
 
-/* ---- runs ---------------------------------------------------------------------------------------------------- */
+/* ---- loops over all cells of one type ------------------------------------------------------------------------ */
 
 LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
 {

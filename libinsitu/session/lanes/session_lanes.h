@@ -23,22 +23,22 @@ typedef struct lane_cells {
 typedef struct lane_sums {
     double lower[3], upper[3]; /* bounds of the vertices */
     double least;              /* smallest absolute volume of the cells */
-    double size_sum;           /* sum of the cube roots of the volumes */
+    double size_sum;           /* sum of the cube roots of the absolute volumes */
     int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;
 
-/* Processes cells from the first one on and stores their sums. Returns the number of processed cells, a multiple of
- * eight. *scalar_count receives the number of cells after the processed ones that the caller must check one by one.
- * This is because a cell among them has an index out of range, is a ghost, or has a volume whose cube root cannot be
- * computed here (also if a coordinate is not finite), or because fewer than eight cells are left. The stored bounds may
- * include vertices of the cells to check, unless they are ghosts. */
+/* Processes cells from the first one on, until a cell needs a check that this function cannot do, and stores the sums
+ * over the processed cells. Returns their number, a multiple of eight. *scalar_count receives the number of cells after
+ * these, at most eight, that the caller must check one by one: one of them has an index out of range, is a ghost, or
+ * has a volume whose cube root cannot be computed here (also if a coordinate is not finite), or fewer than eight cells
+ * are left. The stored bounds may include vertices of the cells to check, unless they are ghosts. */
 typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count);
 
-/* Returns the function for cells of this type and the layout of the grid's arrays; NULL if there is none for the
- * type. */
+/* Returns the function for cells of this type, and for the element sizes of the grid's arrays of indices and
+ * coordinates; NULL if there is none for the type. */
 lane_run *session_find_lane_run(cpu_isa isa, const grid *g, int type);
 
-/* ---- for session_lanes.c ------------------------------------------------------------------------------------- */
+/* ---- tables of functions, for session_lanes.c ---------------------------------------------------------------- */
 
 enum { LANE_TETS, LANE_HEXES, LANE_WEDGES, LANE_PYRAMIDS, LANE_TYPES };
 
