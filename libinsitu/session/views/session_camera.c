@@ -16,7 +16,7 @@
 
 #include "vector3.h"
 
-/* Largest fraction of half the frame that the data may fill. */
+/* Largest part of the frame that a box may fill, in each direction from the centre, as a fraction of half the frame. */
 static const double max_filled = 0.95;
 
 /* Returns `up` or, if `up` is parallel to the direction of view, a coordinate axis that is not parallel to it. */
@@ -32,7 +32,7 @@ static void choose_up(const double direction[3], const double up[3], double out[
     for (int axis = 0; axis < 3; axis++) out[axis] = axis == least;
 }
 
-/* ---- position -------------------------------------------------------------------------------------------------- */
+/* ---- position of the camera ------------------------------------------------------------------------------------ */
 
 /* Tangents of half the horizontal and half the vertical angle of view. */
 typedef struct camera_tangents {
@@ -45,20 +45,20 @@ static camera_tangents find_tangents(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* The maxima a and b over the corners (see the top of this file) for each side of the picture, and the largest distance
- * of a corner from the centre towards the eye. */
+/* Extents of the data. right, left, up, down: for each side of the picture, the maximum a or b over the corners (see
+ * the top of this file). back: the largest distance of a corner from the centre, measured towards the eye. */
 typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
 
-/* Distances from the centre of the frame to the limits within which the data must lie: as fractions of half the frame,
- * or as tangents of angles. */
+/* Limits within which the data must lie in the picture: for each side, the distance of the limit from the centre of the
+ * frame, as a fraction of half the frame or as the tangent of an angle. */
 typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* Extents of the data, measured from the centre of the bounds, and the frames into which they must fit: one pair for a
- * perspective camera and one for an orthographic camera. */
+/* For a perspective and for an orthographic camera: the extents of the data, measured from the centre of the bounds,
+ * and the limits within which the data must lie in the picture. */
 typedef struct camera_fit {
     corner_reach perspective_reach, orthographic_reach;
     camera_frame tangents, frame_fractions;
@@ -109,9 +109,9 @@ static double find_bar_width(const scene_image *image)
     return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
-/* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text: the
- * larger height of the lines in the middle and the lines at the corners. Lines at corners are included only if they
- * extend far into the picture. */
+/* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text. It
+ * is the largest of the heights of the lines in the middle, at the left corner and at the right corner. A corner is
+ * included only if one of its lines extends far into the picture. */
 static double find_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
@@ -131,8 +131,8 @@ static double find_lines_height(const scene_image *image, scene_anchor middle, s
     return line_space * most + (most ? 0.5 : 0);
 }
 
-/* Returns the part of the frame that decorations leave free: towards each side, a fraction of half the frame of at most
- * `most`. */
+/* Returns the part of the frame that decorations leave free: for each side, the distance of its border from the centre,
+ * as a fraction of half the frame. `most` is the fraction without decorations. */
 static camera_frame find_free_frame(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
@@ -209,8 +209,8 @@ static double find_fitting_height(const camera_fit *fit, double aspect)
                 across);
 }
 
-/* Returns a position of the eye between low and high: the middle if is_centred, and otherwise the position nearest to
- * 0. */
+/* Returns a position of the eye between low and high: the middle if is_centred is set or if low > high, and otherwise
+ * the position nearest to 0. */
 static double choose_eye_position(double low, double high, bool is_centred)
 {
     if (is_centred || low > high) return 0.5 * (low + high);
@@ -275,9 +275,10 @@ static bool make_explicit_camera(const scene_image *image, render_camera *out)
     return true;
 }
 
-/* ---- defaults from the data ------------------------------------------------------------------------------------ */
+/* ---- cameras for flat data ------------------------------------------------------------------------------------- */
 
-/* Directs the camera at flat data, so that the data's first axis points to the right and its second axis points up. */
+/* Makes the camera look at data that is flat along `axis`, so that of the other two axes, the first points to the right
+ * and the second points up. Keys of the camera that the scene gives are kept. */
 static void turn_camera_to_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};

@@ -6,8 +6,8 @@
 #include "scene.h"
 #include "session_space.h"
 
-/* Computes the camera. If the data is flat (session_flat_axis()), an automatic camera looks along that axis, is
- * orthographic and fits the box, unless the scene sets something else.
+/* Computes the camera. If the data has no extent along an axis (session_flat_axis()), an automatic camera looks along
+ * this axis, is orthographic and fits the box, unless the scene sets something else.
  *
  * Returns false if the camera's position is equal to its focal point, or if the camera looks along its up direction.
  * Local; the result is the same on every rank. */

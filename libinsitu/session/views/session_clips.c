@@ -9,8 +9,9 @@
 #include "session_distances.h"
 #include "vector3.h"
 
-/* Converts a clip to the renderer's form. The region that is kept is extended by twice the largest shift of a slice's
- * plane (SESSION_BORDER_SHARE), so that a slice on the region's border is visible. */
+/* Converts a clip to the renderer's form. A slice on the border of the data is drawn slightly shifted
+ * (SESSION_BORDER_SHARE). The region that the clip keeps is extended by twice the largest shift, so that a slice on the
+ * region's border is visible. */
 static render_clip make_clip(const session_extent *e, const scene_clip *clip)
 {
     const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
@@ -39,7 +40,7 @@ void session_make_clips(const session_extent *extent, const scene_image *image, 
     for (int i = 0; i < image->clip_count; i++) out[i] = make_clip(extent, &image->clips[i]);
 }
 
-/* ---- boxes around what clips leave ----------------------------------------------------------------------------- */
+/* ---- bounding boxes of the regions that clips leave ------------------------------------------------------------ */
 
 typedef struct clip_box {
     double lower[3], upper[3];
@@ -63,8 +64,8 @@ static void intersect_box(clip_box *box, const double lower[3], const double upp
     }
 }
 
-/* Shrinks the box to the part with normal . x <= distance. Along each axis, the limit follows from the distance that
- * remains after the smallest contributions of the other two axes are subtracted. */
+/* Shrinks the box to the bounds of its part with normal . x <= distance. The limit along an axis follows from the
+ * distance that remains after the smallest contributions of the other two axes to normal . x are subtracted. */
 static void intersect_plane(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;

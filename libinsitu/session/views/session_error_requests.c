@@ -83,7 +83,7 @@ double session_error_request_pixel_size(const void *of, const double centre[3], 
     return least;
 }
 
-/* ---- what images show of a mesh ---------------------------------------------------------------------------------- */
+/* ---- requests of a mesh ------------------------------------------------------------------------------------------ */
 
 void session_free_error_requests(session_error_requests *requests)
 {
@@ -100,7 +100,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
     return is_same;
 }
 
-/* Returns whether two volumes have the same transfer function. Images of a series have copies of one volume. */
+/* Returns whether two volumes have the same transfer function. The pictures of a sweep have copies of one volume. */
 static bool is_same_volume(const scene_volume *a, const scene_volume *b)
 {
     if (!a || !b) return a == b;
@@ -123,7 +123,7 @@ static bool is_same_request(const session_error_request *a, const session_error_
 }
 
 /* Returns the request in the list that equals `like`, and adds it if the list does not contain it. If the list is full,
- * returns the first request, which is that for positions, and sets needs_all, so that all cells are refined. */
+ * returns the request for positions, which is the first one, and sets needs_all, so that all cells are refined. */
 static session_error_request *find_or_add_request(session_error_requests *requests, const session_due_views *views,
                                                   const session_error_request *like)
 {
@@ -234,7 +234,7 @@ static void add_volume(session_error_requests *requests, const session_due_views
 
 /* Sets needs_all if the image shows a volume of the mesh, and needs_outer if it shows the mesh's outer surface. If the
  * outer surface has a threshold, needs_all is set too, because the outer faces of the selected cells may lie anywhere
- * in the mesh. In each case the image also needs the request for positions. */
+ * in the mesh. In each case, marks the request for positions as shown by the image. */
 static void add_whole_layers(session_error_requests *requests, const session_due_views *views,
                              const session_catalogue_mesh *mesh, int index)
 {

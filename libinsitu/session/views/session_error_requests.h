@@ -7,12 +7,12 @@
 #include "session_finer.h"
 #include "session_plan.h"
 
-/* The cameras of the due images. */
+/* The cameras of the images that are due, that is, that are drawn in this step. */
 typedef struct session_due_views {
     const scene *scene;
     int count;              /* number of images of the scene */
     bool *are_due;          /* for each image, whether it is due and its camera has a direction of view */
-    render_camera *cameras; /* cameras of the images that are due */
+    render_camera *cameras; /* camera of each image; set only for images that are due */
     session_extent extent;  /* bounds of the caller's nodes; not computed if no due image needs them for a camera, a
                                slice or a volume */
 } session_due_views;
@@ -24,8 +24,8 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
                                      MPI_Comm comm, session_due_views *out, base_error *error);
 void session_free_due_views(session_due_views *views);
 
-/* A quantity whose error is measured: the isosurfaces of a field, a plane of a slice, a volume, or the positions of all
- * cells. */
+/* A quantity of a mesh whose error, by the division of cells into linear pieces, is measured: the isosurfaces of a
+ * field, a plane of a slice, a volume, or the positions of all cells. */
 typedef struct session_error_request {
     const session_due_views *views;
     bool *images;  /* one flag per image of the scene: set if the image shows what the request measures */

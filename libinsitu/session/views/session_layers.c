@@ -154,8 +154,9 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
         basis->image->name, field->name, low, high);
 }
 
-/* Computes the transfer function of a colour map for a field, and the opacity of a volume (NULL for a surface). If the
- * map has a range over the run, the range includes the values of all steps so far. Collective. */
+/* Computes the transfer function of a colour map for a field. volume: the volume whose opacity the function includes;
+ * NULL for a surface. If the map's range covers all steps of the run, it is extended by the values of this step.
+ * Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -241,8 +242,8 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the part at which the walk is. This is true only of meshes of outer faces that were
- * made for the layer's meshes and threshold. */
+/* Returns whether the layer shows the iterator's current part. A surface layer shows only meshes of outer faces that
+ * were made for the layer's meshes and threshold. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_is_surface_on_mesh(layer, walk->whole) &&
@@ -295,7 +296,7 @@ static bool gather_values(const session_mesh *whole, const session_outer *outer,
     return *values != NULL;
 }
 
-/* Stores the values at the outer faces as the layer's field. They are gathered from the values of the whole mesh.
+/* Stores the values at the outer faces as the layer's field. These values are gathered from those of the whole mesh.
  * Returns false if memory runs out. */
 static bool set_gathered_field(const session_meshes *meshes, session_layers *layers, int slot,
                                const scene_surface *layer, const scene_field *field, render_field *out)
@@ -313,8 +314,8 @@ static bool set_gathered_field(const session_meshes *meshes, session_layers *lay
     return true;
 }
 
-/* Returns the material of a layer. A picture of flat data is a map: if the scene sets no light and no material, its
- * colours are exactly those of the colour bar. */
+/* Returns the material of a layer. Flat data is drawn like a map: if the scene sets no light and no material, the
+ * material is unlit, so that the picture's colours are exactly those of the colour bar. */
 static const scene_material *choose_face_material(const session_layer_basis *basis, const scene_surface *layer)
 {
     static const scene_material bare = {.ambient = 1};
@@ -415,8 +416,8 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
-/* Warns that several volumes are sampled without an error bound. By default, a single volume is integrated with an
- * error bound; several volumes are not, because mixing their segments takes longer. */
+/* Warns that several volumes are sampled without an error bound. By default, a single volume is integrated over the
+ * segments of each ray, with an error bound. Several volumes are not, because blending their segments takes longer. */
 static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
 {
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
@@ -444,7 +445,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
         const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
         const scene_surface shells = session_make_shell_layer(isosurface, image->height);
         status = fill_outer_surface_layer(basis, &shells, i, &layers, error);
-        /* `shells` is a local variable, which does not exist any more when the layer is drawn */
+        /* the layer must not refer to `shells`, which does not exist any more when the layer is drawn */
         layers.surfaces[i].colours = isosurface->colours;
     }
     for (int i = 0; i < image->surface_count && !status; i++)

@@ -17,14 +17,17 @@ typedef struct session_layers {
     render_part *parts;
     int surface_count;
     int first_outer; /* index of the first outer surface in `surfaces` */
-    /* in this order: isosurfaces, their contour lines on shells (if there are any), outer surfaces, planes of slices */
+    /* surface layers in this order: isosurfaces; the same isosurfaces as contour lines on shells (cells without a
+     * volume), if a mesh has only shells; outer surfaces; planes of slices */
     render_surface_layer *surfaces;
     render_volume_layer *volumes;
     session_transfer *transfers; /* transfer functions of the surfaces, followed by those of the volumes */
-    double *distances;           /* isovalue of each surface that is a plane of a slice; 0 for other surfaces */
-    session_contours *contours;  /* contour lines of each surface */
-    /* sections of part_count fields: two per surface (its field and its colour field), then one per volume, then one
-     * per surface for its contour lines */
+    /* for each surface that is a plane of a slice, the signed distance from the plane at which it is drawn; otherwise 0
+     */
+    double *distances;
+    session_contours *contours; /* contour lines of each surface */
+    /* sections of part_count fields, one field for each part: two sections per surface (its field and its colour
+     * field), then one per volume, then one per surface for its contour lines */
     grid_field *fields;
     int64_t field_count;
     render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per surface */

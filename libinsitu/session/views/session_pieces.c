@@ -27,21 +27,23 @@
 
 static const double bytes_per_mib = 1048576;
 
-/* ---- errors ------------------------------------------------------------------------------------------------------ */
+/* ---- errors of the pieces ---------------------------------------------------------------------------------------- */
 
 /* The errors of the linear pieces of one mesh, and the data from which its number of pieces between two nodes is
  * chosen. */
 typedef struct piece_error {
     bool needs_all; /* set if all cells are refined (session_error_requests); the same on every rank */
-    bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
-                       every rank */
+    /* true: a due image shows the mesh, or the scene gives a fixed number of pieces for all cells; the same on every
+     * rank */
+    bool is_shown;
     /* results of measuring all requests of the mesh, combined: the largest error, and the number of cells that
      * isosurfaces may cross */
     session_deviation all;
-    /* for each number of pieces between two nodes: bytes that the finer lattices take on all ranks */
+    /* indexed by the number of pieces between two nodes: bytes that the pieces and nodes of refined cells take on all
+     * ranks */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
-    double light_error; /* largest estimate of the error of a pixel in a volume, if cells have one piece between two
-                           nodes */
+    /* largest estimated error of a pixel that shows a volume, if cells have one piece between two nodes */
+    double light_error;
     /* largest ratio of a volume's estimated error to the error that the scene allows for this volume */
     double light_excess;
     int volume_count; /* number of volumes whose errors were estimated */
@@ -95,8 +97,8 @@ static void apply_error_request_to_part(part_work *work, const session_error_req
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    /* a slice at the border of the data may be moved by this distance (session_choose_slice_isovalue()), so that its
-     * tolerance is positive */
+    /* a slice is the isosurface of distance 0 from its plane. The tolerance is positive, because a slice on the border
+     * of the data may be drawn slightly shifted (session_choose_slice_isovalue()) */
     if (request->has_plane)
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
@@ -120,7 +122,7 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
 
-/* Adds the pieces of refined cells that the requests need to the part's set of pieces. */
+/* Adds to the part's set of pieces those pieces of refined cells that the requests need. */
 static void choose_pieces_of_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks,
                                   base_error *error)
 {
@@ -174,8 +176,9 @@ static void measure_or_choose_mesh(const session_pieces_basis *basis, const sess
     base_free(w);
 }
 
-/* Calls the fill functions of fields that isosurfaces and volumes show. If a fill function fails, its field is not
- * measured, and the plan of the step returns the error later. Local, but fill functions may communicate. */
+/* Calls the caller's functions that fill the values of fields, for those fields that isosurfaces and volumes show. If
+ * such a function fails, its field is not measured, and the error is returned later, when the step's plan is made.
+ * Local, but these functions may communicate. */
 static void fill_fields(const session_pieces_basis *basis, const session_due_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
@@ -321,14 +324,15 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
     return session_agree(basis->team->comm, error);
 }
 
-/* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
+/* ---- choice of the number of pieces ------------------------------------------------------------------------------ */
 
-/* Returns the error of surfaces that is allowed, in pixels. By default it is smaller for small isosurfaces, for the
- * following reason. A ray misses an isosurface if a silhouette or a border of the surface is displaced across the ray.
- * The share of such pixels is the mean displacement of these lines, times their length, divided by the area of the
- * surface. The length grows only with the square root of the area. On brackets that gmsh made, the mean displacement
- * was at most 1/18 of the error bound, and the length at most 8 times the root of the area, in pixels. With an error
- * bound of 1/640 of this root, less than 0.1 % of the surface's pixels are missed. */
+/* Returns the allowed error of surfaces, in pixels. By default it is smaller for small isosurfaces, for the following
+ * reason. A ray misses an isosurface if a silhouette or a border of the surface is displaced across the ray. The share
+ * of the surface's pixels whose rays do so is the mean displacement of silhouettes and borders, times their length,
+ * divided by the area of the surface. Their length grows only with the square root of the area. On brackets that gmsh
+ * made, the mean displacement was at most 1/18 of the error bound, and the length at most 8 times the root of the area,
+ * in pixels. With an error bound of 1/640 of the root of the area, less than 0.1 % of the surface's pixels are missed.
+ */
 static double find_allowed_error(const scene *scene, const piece_error *of)
 {
     static const double least_share = 0.25;
@@ -388,7 +392,7 @@ static void warn_of_pyramids(const char *mesh, const scene *scene, const session
                  scene->finer_pieces ? "finer_pieces" : "surface_error");
 }
 
-/* ---- memory ------------------------------------------------------------------------------------------------------ */
+/* ---- limit of the memory ----------------------------------------------------------------------------------------- */
 
 /* Returns the number of components of all fields of a mesh that images of the scene show. */
 static int count_components(const scene *scene, const session_catalogue_mesh *mesh)
@@ -407,8 +411,8 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the number of bytes that the finer lattices of a mesh and the values at their nodes take, if there are
- * `parts` pieces between two nodes. The result never decreases if `parts` increases. */
+/* Returns the number of bytes that the pieces and nodes of a mesh's refined cells, and the values at these nodes, take
+ * if there are `parts` pieces between two nodes. The result never decreases if `parts` increases. */
 static double compute_finer_lattice_bytes(const piece_error *of, int parts)
 {
     const session_finer_bytes *bytes = &of->bytes[parts];
@@ -504,8 +508,8 @@ static void choose_pieces_of_all_meshes(const session_pieces_basis *basis, piece
     }
     limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
-        /* the error bound is valid for serendipity cells only if the nodes that they lack, compared with complete cells
-         * of their order, are added */
+        /* a serendipity cell lacks some nodes of the complete cell of its order. The error bound is valid only if these
+         * nodes are added */
         choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }

@@ -68,7 +68,7 @@ static void fill_view(const session_space *space, const scene_image *image, sess
     out->step = sample_distance(&space->extent, image);
 }
 
-/* ---- time ---------------------------------------------------------------------------------------------------- */
+/* ---- time that samples take ---------------------------------------------------------------------------------- */
 
 /* Estimated time in seconds that a sample takes on one thread. Measured times were 27 to 240 ns, over all types of
  * cells and for many and few rays. */
@@ -176,7 +176,7 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
                  why ? why : "");
 }
 
-/* ---- all of the view ----------------------------------------------------------------------------------------- */
+/* ---- cameras, lights and clips together ---------------------------------------------------------------------- */
 
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
                                 const session_team *team, session_report *report, session_view *out, base_error *error)

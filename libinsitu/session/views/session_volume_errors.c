@@ -52,8 +52,9 @@ static const double largest_extinction = 1e6;
 
 /* Indices of the quantities that are integrated over the range of values and along rays. */
 enum {
-    IN_DARK = 0,  /* change of light, in three colour channels, if no light arrives from behind */
-    IN_LIGHT = 3, /* change of light, in three colour channels, if the light that arrives from behind is 1 */
+    /* change of light by errors of values, in three colour channels, if no light arrives from behind (b = 0) */
+    IN_DARK = 0,
+    IN_LIGHT = 3, /* the same change if the light that arrives from behind is 1 (b = 1) */
     EMISSION = 6, /* colour times extinction, in three colour channels */
     EXTINCTION = 9,
     QUANTITIES = 10
@@ -77,7 +78,7 @@ typedef struct volume_errors {
     int64_t sum_count;
 } volume_errors;
 
-/* ---- ranges ------------------------------------------------------------------------------------------------------ */
+/* ---- ranges of values -------------------------------------------------------------------------------------------- */
 
 static bool is_same_field(const scene_field *a, const scene_field *b)
 {
@@ -226,7 +227,7 @@ static void integrate_step(const render_transfer *t, double from, double to, con
     after[EXTINCTION] = before[EXTINCTION] + 0.5 * (extinctions[0] + extinctions[1]) * (to - from);
 }
 
-/* Fills the tables of the integrals over the range. */
+/* Fills the table of the integrals over the range of values, and their slopes outside of the range. */
 static void integrate_transfer(const render_transfer *t, volume_errors *out)
 {
     static const double none[QUANTITIES];
@@ -273,7 +274,7 @@ static void end_estimate(volume_errors *errors)
     *errors = (volume_errors){0};
 }
 
-/* ---- cells ------------------------------------------------------------------------------------------------------- */
+/* ---- contributions of cells to the estimate ---------------------------------------------------------------------- */
 
 /* Returns the integral of a quantity from the low end of the range of values (position 0) to a position. */
 static double find_integral_at(const volume_errors *of, int quantity, double position)
@@ -287,9 +288,9 @@ static double find_integral_at(const volume_errors *of, int quantity, double pos
 }
 
 /* Computes all quantities per unit of length of a ray in a cell of the mesh. For changes of light, this is the mean
- * over the cell of the bracket at the top of this file, times the root mean square of the cell's error in the values.
- * For the other quantities, it is the mean over the cell. All values between the cell's smallest and largest one are
- * assumed to be equally frequent. */
+ * over the cell of the bracketed factor in the formula at the top of this file, times the root mean square of the error
+ * of the cell's values. For the other quantities, it is their mean over the cell. All values between the cell's
+ * smallest and largest one are assumed to be equally frequent. */
 static void find_light_per_length(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
@@ -307,14 +308,15 @@ static void find_light_per_length(const volume_errors *of, const session_value_c
     for (int q = 0; q < EMISSION; q++) out[q] *= error > 0 ? error / (high - low) : 0;
 }
 
-/* The part of a grid over a picture that a cell of the mesh covers: a rectangle, in units of cells of the grid, and the
- * area that one cell of the grid has at the mesh's cell, in scene units. */
+/* The part of the grid over a picture that a cell of the mesh covers. low, high: a rectangle, in units of cells of the
+ * grid. area: area that one cell of the grid covers at the depth of the mesh's cell, in square scene units. */
 typedef struct covered_part {
     double low[2], high[2], area;
 } covered_part;
 
 /* Finds the part of the grid that a cell of the mesh covers. If the cell's distance from the eye along the camera's
- * axis is smaller than its radius, it is replaced by the radius. Returns false if the cell is behind the eye. */
+ * axis is smaller than the cell's radius, the distance is taken to be the radius. Returns false if the cell is behind
+ * the eye. */
 static bool project_cell(const render_camera *camera, const session_value_cell *cell, covered_part *out)
 {
     const double half[2] = {camera->half_height * camera->width / camera->height, camera->half_height};
@@ -355,7 +357,7 @@ static void add_sum(int64_t *sum, double value)
     *sum += more;
 }
 
-/* Adds a cell to the estimate `of`. */
+/* Adds the contributions of a cell of the mesh to the estimate `of`, which is a volume_errors. */
 static void add_cell(void *of, const session_value_cell *cell)
 {
     enum { LAST = GRID_SIZE - 1 };
@@ -407,7 +409,7 @@ static double find_largest_pixel_error(const volume_errors *errors)
     return most;
 }
 
-/* ---- all cells --------------------------------------------------------------------------------------------------- */
+/* ---- estimate over all cells of a mesh --------------------------------------------------------------------------- */
 
 /* The task of adding the cells of one part of a mesh to an estimate. */
 typedef struct estimate_work {
