@@ -45,9 +45,9 @@ static bool is_sampling_unspecified(const scene_file_sampling *in)
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
-/* Chooses the default method for volumes. A single volume is integrated with an error bound, because samples are
- * cheaper but leave noise of unknown size. Several volumes are sampled, because their segments would have to be mixed
- * pixel by pixel. */
+/* Chooses the default method for volumes. A single volume is integrated over the segments of each ray, with an error
+ * bound: samples would be cheaper, but their noise has no known bound. Several volumes are sampled, because otherwise
+ * the segments of different volumes would have to be blended at each pixel. */
 static void choose_method_of_volumes(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
@@ -121,8 +121,8 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Converts the variants of an image that differ in their layers (field, isovalue or plane). Of the views of each
- * variant, only the first is converted. */
+/* Converts an image once for each combination of a field, an isovalue and a plane of its sweep. Of the views of an
+ * orbit, only the first is converted. */
 static insitu_status convert_layer_variants(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -139,8 +139,8 @@ static insitu_status convert_layer_variants(const scene_document *d, const scene
     return status;
 }
 
-/* Inserts the other views of orbits after the first view of each image. The loop starts at the last image, because
- * there is free space only behind it. */
+/* Inserts the other views of orbits after the first view of each image. The loop starts at the last image, because the
+ * array has unused entries only at its end. */
 static void add_orbit_views(scene *s, int picture_count)
 {
     int end = picture_count;

@@ -189,9 +189,10 @@ typedef struct scene_isosurface {
     float opacity;
     scene_material material;
     scene_normal normals;
-    double difference; /* distance between samples of central differences, in cell sizes, > 0; 1 by default */
-    uint32_t clips;    /* bit mask of the clips that cut the layer; bit n stands for clip n of the image */
-    int number;        /* index of the layer in the image's list */
+    /* distance between the samples from which central differences are computed, in cell sizes, > 0; 1 by default */
+    double difference;
+    uint32_t clips; /* bit mask of the clips that cut the layer; bit n stands for clip n of the image */
+    int number;     /* index of the layer in the image's list */
 } scene_isosurface;
 
 typedef struct scene_volume {
@@ -215,7 +216,8 @@ typedef struct scene_surface {
     /* selects the meshes whose outer surface is drawn; only the names of meshes are used, and the field's name is
      * NULL */
     scene_field meshes_field;
-    /* set if the session has added the layer for meshes that consist only of shells; a scene file cannot set it */
+    /* set if the session has added the layer to draw isosurfaces on meshes that consist only of shells (cells without a
+     * volume); a scene file cannot set this */
     bool is_of_shells;
     float colour[3];      /* colour of the surface, linear RGB, unless a field colours it (has_colour_by) */
     float edge_width;     /* width of the edges in pixels; 0: no edges are drawn */
@@ -308,8 +310,8 @@ typedef struct scene_camera_point {
 typedef struct scene_camera {
     /* set if eye and focal point are computed from the bounds of all data, with the camera looking along -direction */
     bool is_automatic;
-    /* each is set if the scene gives the camera's key of this name (direction, up, fit, projection); if the data is
-     * flat, missing keys are chosen from the data (session_camera.h) */
+    /* each is set if the scene gives the camera's key of this name (direction, up, fit, projection); keys that are
+     * missing are chosen from the data if the data has no extent along an axis (session_camera.h) */
     bool has_direction, has_up, has_fit, has_projection;
     bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
     double lower[3], upper[3];
@@ -317,8 +319,9 @@ typedef struct scene_camera {
     double direction[3]; /* automatic camera: direction from the focal point to the eye */
     double up[3];
     double angle; /* vertical angle of view in degrees; 40 by default */
-    double zoom;  /* automatic camera: 1 fits the bounds into the picture; larger values are closer */
-    /* automatic camera: true: the box of the bounds is fitted into the frame; false: the sphere around this box */
+    double zoom;  /* zoom of an automatic camera: 1 fits the bounds into the picture; larger values are closer */
+    /* automatic camera: true: the box of the bounds is fitted into the frame; false: the sphere around this box is
+     * fitted */
     bool fits_box;
     bool is_orthographic;
     /* orthographic camera: height of the visible region in scene units; 0: the height that a perspective camera would
@@ -371,12 +374,12 @@ typedef struct scene_number_form {
 /* Titles, colour bars and lines that are drawn in addition to the data. */
 typedef struct scene_decorations {
     bool is_given; /* set if the scene has decorations; otherwise none are drawn */
-    char *title;   /* title of the picture; NULL: none */
+    char *title;   /* title of the picture; NULL: there is none */
     int words_count;
     scene_words *words;
     bool has_bars; /* set if a bar is drawn for each layer that is coloured by a field */
     scene_anchor bar_anchor;
-    int tick_count; /* approximate number of ticks per bar */
+    int tick_count; /* maximum number of ticks per bar; a bar with one band per integer may have more */
     int label_count;
     char **labels; /* labels of the bars, in order; further bars are labelled with the names of their fields */
     int unit_count;
@@ -388,8 +391,8 @@ typedef struct scene_decorations {
     char *scale_unit; /* unit of length of the scale bar; NULL: none */
     scene_anchor scale_bar_anchor;
     bool has_colour;
-    /* colour of text and lines, linear RGB; if has_colour is not set, it is light on a dark background and dark on a
-     * light one */
+    /* colour of text and lines, linear RGB, if has_colour is set; otherwise they are light on a dark background and
+     * dark on a light one */
     float colour[3];
     double size; /* height of text, as a fraction of the picture's height */
 } scene_decorations;
@@ -418,7 +421,8 @@ typedef struct scene_output {
     bool is_inset;       /* set if the picture is laid over the panels of a montage */
     scene_anchor corner; /* corner of an inset */
     int montage;         /* index of the scene's montage that contains the picture; -1: none */
-    /* index of the panel that shows the first view; the indices of insets follow those of all panels */
+    /* index of the panel that shows the first view of the output; for an inset, the number of panels (columns × rows)
+     */
     int first_panel;
 } scene_output;
 
@@ -434,12 +438,14 @@ typedef struct scene_montage {
     int columns, rows;
     int width, height; /* size of each picture in pixels */
     scene_format format;
-    int panel_count;    /* number of pictures in a step, at most columns × rows */
-    bool shares_bars;   /* set if colour bars that all pictures have in common are drawn once, beside the pictures */
-    int bar_width;      /* width in pixels of the strip for shared bars; 0 if shares_bars is not set */
-    bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
-    int frame_width;    /* width in pixels of the frames of insets */
-    int inset_margin;   /* distance in pixels of insets from the edges of the panels, including their frames */
+    int panel_count;  /* number of panels that have a picture, at most columns × rows */
+    bool shares_bars; /* set if colour bars that all pictures have in common are drawn once, beside the pictures */
+    int bar_width;    /* width in pixels of the strip for shared bars; 0 if shares_bars is not set */
+    /* set if the strip for shared colour bars is left of the pictures, otherwise it is right of them */
+    bool are_bars_left;
+    int frame_width; /* width in pixels of the frames of insets */
+    /* distance in pixels of an inset from the outer edges of the panels, including the width of its frame */
+    int inset_margin;
     /* rectangle of the inset at each corner (scene_anchor), without its frame; width 0: there is no inset. No two
      * insets overlap. */
     scene_rectangle insets[SCENE_ANCHORS];
@@ -448,8 +454,9 @@ typedef struct scene_montage {
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */
 typedef struct scene_database {
     char *path;      /* path of the folder, relative to rank 0's working directory, without a slash at its end */
-    int first_image; /* index in the scene file of the first image that writes to the database */
-    /* each is set if the table has a column for images, orbits, isovalues, planes or fields */
+    int first_image; /* index, in the scene file, of the first image whose pictures are in the database */
+    /* has_images is set if the table has a column for the name of the image; the others, likewise for the angles of an
+     * orbit, the isovalue, the plane and the field */
     bool has_images, has_orbits, has_isovalues, has_planes, has_fields;
 } scene_database;
 
@@ -473,8 +480,8 @@ typedef struct scene_statistics {
 } scene_statistics;
 
 /* Identifies one of the pictures that an image of the scene file makes. There is one picture for each combination of a
- * field, an isovalue and a plane of its sweep and a view of its orbit, in this order, so that views change fastest.
- * Each is a scene_image. */
+ * field, an isovalue and a plane of the image's sweep and a view of its orbit, in this order, so that views change
+ * fastest. Each picture has its own scene_image. */
 typedef struct scene_variant {
     int source; /* index of the image in the file */
     /* index of the picture's combination of field, isovalue and plane among all combinations of the sweep; 0 without a
@@ -509,7 +516,7 @@ typedef struct scene_image {
     scene_decorations decorations;
     int clip_count; /* number of clips of all layers together, 0 .. SCENE_MAX_CLIPS, without duplicates */
     scene_clip *clips;
-    uint32_t clips_of_all; /* bit mask of the clips that cut all layers */
+    uint32_t clips_of_all; /* bit mask of the clips that cut all layers; bit n stands for entry n of `clips` */
     bool has_lights;       /* set if the scene gives lights */
     /* number of lights, 1 .. 8; if the scene gives none, there are a default key light and fill light */
     int light_count;
@@ -518,10 +525,11 @@ typedef struct scene_image {
     /* number of rays for ambient occlusion per hit, 1 .. 64; 0 (default): no ambient occlusion */
     int occlusion_samples;
     double occlusion_radius; /* length of occlusion rays in scene units; 0: chosen from the data's bounds */
-    /* method for volumes; by default segments for one volume, samples for several */
+    /* method for volumes: samples along each ray, or integration over segments into which the ray's interval in each
+     * cell is divided; by default segments for one volume, samples for several */
     scene_sampling_method method;
-    /* error bound of segments in a colour channel, in linear light; 0: there is no bound, so that `step` determines the
-     * error. The default for one volume is 0.01. */
+    /* method segments: allowed error of a colour channel, in linear light; 0: the error has no bound and depends on
+     * `step`. The default for one volume is 0.01. */
     double max_error;
     bool has_default_samples; /* set if several volumes are sampled because the scene does not specify the method */
     double step;              /* distance between samples in scene units; 0: step_cells is used */
@@ -566,7 +574,8 @@ scene_field *scene_next_field(scene_field_walk *walk);
 /* Returns the word for a kind of layer, such as "isosurface", for messages. */
 const char *scene_get_layer_word(scene_layer_kind kind);
 
-/* Returns whether the image is the first variant; results that all variants share are stored with it. */
+/* Returns whether this is the first of the pictures (scene_variant) that an image of the scene file makes. Results that
+ * all these pictures share are stored with the first one. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
@@ -583,8 +592,8 @@ static inline bool scene_draws_text(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells over which trees are built: SCENE_TREE_FULL: all cells; SCENE_TREE_PARTIAL: only cells that images can
- * show; SCENE_TREE_AUTO: whichever of these two is estimated to cost less time. */
+/* The cells over which bounding volume hierarchies (trees) are built. SCENE_TREE_FULL: all cells; SCENE_TREE_PARTIAL:
+ * only cells that images can show; SCENE_TREE_AUTO: whichever of these two is estimated to cost less time. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
@@ -614,7 +623,8 @@ typedef struct scene_parameter {
     double value;
 } scene_parameter;
 
-/* Draws the vertices of meshes at x + scale * u, where u is the value of a field at the vertex. */
+/* A request to draw the vertices of meshes at x + scale * u, where x is the position of a vertex, and u is the value of
+ * a field at this vertex. */
 typedef struct scene_warp {
     /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes
      * (scene_name_selects_mesh()) */
@@ -624,7 +634,7 @@ typedef struct scene_warp {
     int line, field_line; /* lines of the mesh's name and of the field in the scene file */
 } scene_warp;
 
-/* Draws meshes together with their mirror images. */
+/* A request to draw meshes together with their mirror images. */
 typedef struct scene_mirror {
     /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes */
     char *mesh;
@@ -686,7 +696,7 @@ const scene_warp *scene_find_warp(const scene *s, const char *mesh);
  * the one with the longest name is used. */
 const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
-/* The values by which placeholders are replaced. */
+/* The values by which placeholders in texts and paths, such as {cycle}, are replaced. */
 typedef struct scene_placeholder_values {
     const char *name; /* name of the image */
     long long cycle;

@@ -19,10 +19,11 @@ __attribute__((format(printf, 2, 3))) static void format_path(char path[path_siz
     va_end(arguments);
 }
 
-/* Maximum ratio of the ends of a logarithmic range. The exponents of float32 do not allow a larger ratio. */
+/* Maximum ratio of the ends of a logarithmic range. As a fraction of the high end, the low end is then well above the
+ * smallest normal float32 number, 1.2e-38. */
 static const double widest_log_range = 1e30;
 
-/* ---- tables ---------------------------------------------------------------------------------------------------- */
+/* ---- tables of colours ----------------------------------------------------------------------------------------- */
 
 static insitu_status make_table(const scene_document *d, const char *name, int count, scene_colour_map *out)
 {
@@ -60,7 +61,7 @@ static insitu_status fill_table_from_points(const scene_document *d, const scene
     return status;
 }
 
-/* ---- lists ----------------------------------------------------------------------------------------------------- */
+/* ---- lists of colours ------------------------------------------------------------------------------------------ */
 
 static insitu_status read_positions(const scene_document *d, const char *path, scene_colour_points *points)
 {
@@ -102,7 +103,7 @@ static insitu_status read_colour_list(const scene_document *d, const char *path,
     return status;
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------------- */
+/* ---- files with colour maps ------------------------------------------------------------------------------------ */
 
 /* Returns the path by which a file is opened. Paths in a scene are relative to the scene's folder. */
 static char *path_from_scene(const char *scene_path, const char *name)
@@ -183,7 +184,7 @@ static insitu_status read_colour_map_file(const scene_document *d, const char *p
     return status;
 }
 
-/* ---- the map --------------------------------------------------------------------------------------------------- */
+/* ---- choice of the colour map ---------------------------------------------------------------------------------- */
 
 static bool has_key(const scene_document *d, const char *path, const char *key)
 {

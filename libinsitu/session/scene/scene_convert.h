@@ -22,8 +22,8 @@ bool scene_normalize(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* Numbers of fields, isovalues, planes and views for which an image makes pictures. An image makes one picture for each
- * combination, so that the product is the number of its pictures in a step. */
+/* Numbers of fields, isovalues, planes and views over which an image varies. It makes one picture for each combination,
+ * so that the product is the number of its pictures in a step. */
 typedef struct scene_series {
     int fields, isovalues, planes, views; /* each is at least 1 */
 } scene_series;
@@ -34,8 +34,8 @@ insitu_status scene_count_sweep_dimensions(const scene_document *d, const char *
                                            scene_series *out);
 /* Counts the pictures of all images together; more than SCENE_MAX_PICTURES are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Removes from the image's layers, as the file gives them, the fields, isovalues and planes that its variant does not
- * show. A variant is one of the pictures that an image makes in a step (scene_variant). */
+/* Reduces the layers of an image to what one of its pictures shows (scene_variant): the field, the isovalue and the
+ * plane that the picture's sweep selects. in: the image as the file gives it. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
@@ -49,13 +49,14 @@ int scene_count_views(const scene_document *d, const char *path, const scene_fil
 /* Sets the direction of a camera with an orbit to the direction of the view with this index. */
 void scene_set_orbit_view(scene_camera *camera, int view);
 
-/* Converts the path of an output that belongs to a database. */
+/* Converts the path of an output that belongs to a Cinema database (scene_database). */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
-/* Lists the montages of all images, and assigns indices to their panels. Must be called before views are added to the
- * scene. */
+/* Lists the files with several pictures (scene_montage) of all images, and assigns indices to the pictures in them.
+ * Must be called before the further views of orbits are added to the scene. */
 insitu_status scene_find_montages(const scene_document *d, scene *s);
-/* Lists the databases of all images. Must be called before views are added to the scene. */
+/* Lists the Cinema databases of all images. Must be called before the further views of orbits are added to the scene.
+ */
 insitu_status scene_find_databases(const scene_document *d, scene *s);
 
 /* The functions below convert one part of an image each. path: path of this part in the file, for messages. */
@@ -99,8 +100,8 @@ insitu_status scene_convert_meshes(const scene_document *d, const char *layer, s
  * path of the mapping with the key `component`. */
 insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
-/* Converts a field of a layer. layer: path of the layer, because the layer selects the meshes; path: path of the
- * mapping that names the field. */
+/* Converts a field of a layer. layer: path of the layer, which names the meshes; path: path of the mapping that names
+ * the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
@@ -113,7 +114,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
                                   const scene_field *colours, int height, scene_lines *out);
 
-/* Converts a material. If in is NULL, the result is the default material. It is slightly glossy. */
+/* Converts a material. in: NULL for the default material, which is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
 /* Adds the clips at the path to the image's list (scene_image.clips), and sets their bits in *set. Bit i stands for

@@ -17,7 +17,7 @@ enum { KEYS = sizeof keys / sizeof *keys, KEY_SIZE = SCENE_PATH_SIZE + 16, SPACE
 #define KEY_WORDS                                                                                                      \
     "one of expression, field, magnitude, gradient, divergence, vorticity, q_criterion, lambda2 and strain_rate"
 
-/* ---- inputs ----------------------------------------------------------------------------------------------------- */
+/* ---- inputs of derived fields ----------------------------------------------------------------------------------- */
 
 static insitu_status add_input(const scene_document *d, const char *path, const scene_reference *reference,
                                scene_derived *out)
@@ -46,7 +46,8 @@ static insitu_status store_expression(const scene_document *d, const char *path,
     return status;
 }
 
-/* Reads the name of a field, which may be followed by a component. Any other expression is an error. */
+/* Reads a text that consists of the name of a field, which may be followed by a component, and adds this field to the
+ * inputs. Any other text is an error. */
 static insitu_status add_reference(const scene_document *d, const char *path, const char *text, scene_derived *out)
 {
     scene_expression one;
@@ -86,8 +87,8 @@ static insitu_status read_references(const scene_document *d, const char *path, 
     return status;
 }
 
-/* Reads the field that the key `field` or `magnitude` of a derived field names. The given component of the field is
- * stored as an expression that consists only of this input. */
+/* Reads the field that the key `field` or `magnitude` of a derived field names. The derived field becomes an expression
+ * that consists only of this input, with the given component. */
 static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;
@@ -106,7 +107,7 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
     return INSITU_OK;
 }
 
-/* ---- one field -------------------------------------------------------------------------------------------------- */
+/* ---- conversion of one derived field ---------------------------------------------------------------------------- */
 
 /* Finds the key of a derived field that tells how the field is computed, such as `gradient`, and checks that there is
  * exactly one. *found receives the key's index in `keys`, or -1 for an expression. */

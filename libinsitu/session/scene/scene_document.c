@@ -19,7 +19,8 @@
 
 enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64, most_plain = 60 };
 
-/* Header of a block of memory for the schema's structs. The memory behind it is aligned for any type. */
+/* A block of memory for the schema's structs: the link to the next block of the list, followed by the memory itself,
+ * which is aligned for any type. */
 struct scene_block {
     scene_block *next;
     max_align_t memory[];
@@ -42,7 +43,7 @@ static size_t count_lines_before(const char *text, size_t size, size_t offset)
 static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text,
                                      size_t size)
 {
-    /* libyaml reports some failed allocations as other errors, so that memory is tested here */
+    /* libyaml does not set an error for some failed allocations */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
@@ -369,13 +370,14 @@ static void convert_text_to_list(const char *text, const cyaml_schema_value_t *v
 static bool read_number(const char *text, double *number)
 {
     char *end;
-    if (text[strspn(text, "+-.0123456789eE")]) return false; /* rejects nan, inf and hexadecimal numbers */
+    /* strtod() would also accept nan, inf and hexadecimal numbers */
+    if (text[strspn(text, "+-.0123456789eE")]) return false;
     *number = strtod(text, &end);
     return end != text && !*end && isfinite(*number);
 }
 
-/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is a YAML comment, or the keys below the
- * value lack their indentation. */
+/* Writes a question that suggests why a value is empty: YAML reads an unquoted #ff0000 as a comment, or the keys below
+ * the value are not indented. */
 static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                     char question[question_size])
 {
@@ -394,8 +396,8 @@ static bool mapping_has_key(const cyaml_schema_value_t *mapping, const char *key
     return f->key != NULL;
 }
 
-/* Writes a question about a word that stands in place of a mapping. The question depends on whether the word is one of
- * the mapping's keys or the name of a field. */
+/* Writes a question about a word that stands in place of a mapping. It suggests the mapping that was probably meant if
+ * the word is one of the mapping's keys or can be the name of a field. */
 static void suggest_mapping(const char *word, const cyaml_schema_value_t *mapping, const char *begin, const char *end,
                             char question[question_size])
 {
@@ -506,7 +508,7 @@ static bool is_valid_scalar(const yaml_node_t *node, const cyaml_schema_value_t 
     if (node->type != YAML_SCALAR_NODE) return false;
     const char *text = node_text(node);
     const size_t length = strlen(text);
-    if (length != node->data.scalar.length) return false; /* rejects texts that contain a NUL */
+    if (length != node->data.scalar.length) return false; /* false for a text that contains a NUL */
     double number;
     switch (value->type) {
     case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
@@ -518,9 +520,9 @@ static bool is_valid_scalar(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Makes *to the address at which `count` values are stored. If the schema has a pointer at *to, memory for the values
- * is allocated, and its address is stored in the pointer. If *to is NULL on entry, nothing is stored, because the value
- * will be read from the tree of the document. */
+/* Sets *to to the address at which `count` values are to be stored. If the schema describes the member at *to as a
+ * pointer, allocates memory for the values, and stores its address in this member. If *to is NULL on entry, nothing is
+ * done, because the value will be read from the tree of the document. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;

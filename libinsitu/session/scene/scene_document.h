@@ -14,7 +14,7 @@ typedef struct scene_document {
     const char *file_name; /* name of the file for messages; borrowed */
     const char *text;      /* text of the file, `size` bytes; borrowed until the document is closed */
     size_t size;
-    base_error *error; /* receives the messages; borrowed */
+    base_error *error; /* receives the error messages; borrowed */
     /* files that the scene names; borrowed; NULL if the scene may name no files */
     struct scene_attachments *attachments;
     yaml_document_t yaml;

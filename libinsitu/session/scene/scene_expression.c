@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    /* number of calls of parse_sign() that have not returned: one for the whole expression, and one for each bracket,
-     * function and exponent that is being parsed, of which there are at most MOST_NESTED */
+    /* number of calls of parse_sign() that have not returned. This is one for the whole expression, plus one for each
+     * open bracket, function and exponent; at most MOST_NESTED of these may be open. */
     int nesting_depth;
     int stack_count; /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;
@@ -63,7 +63,7 @@ static bool fail_for_memory(parser *p)
     return false;
 }
 
-/* ---- words ------------------------------------------------------------------------------------------------------ */
+/* ---- characters and words --------------------------------------------------------------------------------------- */
 
 static bool is_blank(char c)
 {
@@ -110,7 +110,7 @@ static bool fail_expecting(parser *p, const char *expected)
                 before > 40 ? 40 : before, before > 40 ? p->cursor - 40 : p->text, expected);
 }
 
-/* ---- instructions ----------------------------------------------------------------------------------------------- */
+/* ---- emitting instructions -------------------------------------------------------------------------------------- */
 
 static bool add_instruction(parser *p, scene_operation operation, int input, double number)
 {
@@ -153,7 +153,7 @@ static bool add_power(parser *p)
     return add_instruction(p, SCENE_OP_WHOLE_POWER, 0, exponent);
 }
 
-/* ---- fields ----------------------------------------------------------------------------------------------------- */
+/* ---- parsing fields and functions ------------------------------------------------------------------------------- */
 
 static bool push_input(parser *p, const char *name, int component)
 {
@@ -169,7 +169,7 @@ static bool push_input(parser *p, const char *name, int component)
     return push_operand(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
 }
 
-/* Reads the component that follows a point. */
+/* Reads the component that follows a point (.x, .y, .z or a number). */
 static bool parse_component(parser *p, const char *name, int *component)
 {
     const char *word = p->cursor;
@@ -264,7 +264,7 @@ static bool parse_field(parser *p)
     return push_input(p, name, component);
 }
 
-/* ---- the grammar ------------------------------------------------------------------------------------------------ */
+/* ---- parsing the rules of the grammar --------------------------------------------------------------------------- */
 
 static bool parse_number(parser *p)
 {

@@ -80,7 +80,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
     return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
 
-/* ---- iteration over fields --------------------------------------------------------------------------------------- */
+/* ---- iteration over the fields of an image's layers -------------------------------------------------------------- */
 
 /* Returns the contour lines of a layer; NULL for a volume, because volumes have none. */
 static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)

@@ -35,8 +35,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* Converts the colours of an isosurface layer. first: number of isovalues of earlier layers; default colours continue
- * the cycle after these isovalues, so that layers have different colours. */
+/* Converts the colours of an isosurface layer. first: number of isovalues of earlier layers. Default colours continue
+ * the cycle after this number, so that layers have different colours. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {
@@ -195,7 +195,7 @@ static void set_layer_number(const scene_file_layer *in, int number, scene_image
     if (in->slice) out->slices[out->slice_count - 1].number = number;
 }
 
-/* Converts a layer. values: number of isovalues of earlier layers. */
+/* Converts a layer. values: number of isovalues of earlier isosurface layers. */
 static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
                                    scene_image *out)
 {

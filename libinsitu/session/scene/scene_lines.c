@@ -36,7 +36,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* Sets the field of contour lines for which the scene gives no field: it is the field that colours the layer. */
+/* Sets the field of contour lines if the scene gives none: the lines are contours of the field that colours the layer.
+ */
 static insitu_status use_field_that_colours_layer(const scene_document *d, const char *layer, const char *path,
                                                   const scene_file_lines *in, const scene_field *colours,
                                                   scene_lines *out)

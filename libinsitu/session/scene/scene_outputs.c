@@ -22,8 +22,8 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    /* for an integer: its minimum number of digits; for other numbers: the number of digits after the point or of
-     * significant digits; -1: as few digits as needed */
+    /* for an integer: its minimum number of digits. For another number: the digits after the point ('f', 'e') or
+     * significant digits ('g'); -1: the value's default number of significant digits. */
     int digits;
     char conversion; /* format of a number that is not whole: 'f', 'e' or 'g'; 't' for a text; 0 for a whole number */
     size_t length;   /* number of bytes of the placeholder in the pattern */
@@ -76,7 +76,7 @@ static placeholder parse_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* Writes a number and returns its length. fewest: number of significant digits if the placeholder gives none. */
+/* Writes a number and returns its length. fewest: number of significant digits if the placeholder does not set any. */
 static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
@@ -130,8 +130,9 @@ char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
     return text;
 }
 
-/* Placeholders such as {view} may be used only if the image has a certain key, such as camera.orbit. Returns a
- * description of this key if the image lacks it; otherwise NULL. image: path of the image in the file. */
+/* Some placeholders may be used only if the image has a certain key; {view}, for example, needs camera.orbit. Returns a
+ * description of the key that the placeholder needs if the image lacks this key; otherwise NULL. image: path of the
+ * image in the file. */
 static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -260,10 +261,10 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
     return status;
 }
 
-/* ---- no two outputs may be the same file ------------------------------------------------------------------------- */
+/* ---- check that outputs are different files ---------------------------------------------------------------------- */
 
-/* Cycle that is inserted into paths before they are compared. It has so many digits that {cycle} and {cycle:03} give
- * equal paths. */
+/* Cycle that is inserted for {cycle} into paths before they are compared. It has so many digits that {cycle:03}, for
+ * example, adds no zeros and gives the same path as {cycle}. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 

@@ -12,8 +12,8 @@
 typedef enum scene_frame { SCENE_FRAME_CAMERA, SCENE_FRAME_WORLD } scene_frame;
 
 typedef struct scene_file_automatic {
-    double *direction;   /* from the focal point to the eye, x y z */
-    double *zoom;        /* 1 fits the bounds into the picture; larger values are closer */
+    double *direction;   /* direction from the focal point to the eye, x y z */
+    double *zoom;        /* zoom: 1 fits the bounds into the picture; larger values are closer */
     int *fit;            /* what must fit into the frame (scene_fit) */
     double (*bounds)[3]; /* two opposite corners, each a list of 3 numbers */
 } scene_file_automatic;
@@ -47,7 +47,7 @@ typedef struct scene_file_camera {
 } scene_file_camera;
 
 typedef struct scene_file_light {
-    double *direction; /* towards the light, x y z */
+    double *direction; /* direction towards the light, x y z */
     double *colour;    /* red, green and blue, sRGB, 0 .. 1 */
     double *intensity; /* factor by which the light's colour is multiplied */
     scene_frame *in;   /* axes in which the direction is given: those of the camera or of the scene */
@@ -56,7 +56,7 @@ typedef struct scene_file_light {
 
 typedef struct scene_file_occlusion {
     int *samples;   /* number of occlusion rays per hit */
-    double *radius; /* length of the rays in scene units */
+    double *radius; /* length of the occlusion rays in scene units */
 } scene_file_occlusion;
 
 typedef struct scene_file_material {
@@ -119,7 +119,7 @@ typedef struct scene_file_isosurface {
     double *opacity;
     scene_file_material *material;
     int *normals;       /* how normals are computed (scene_normal) */
-    double *difference; /* distance between the samples of differences, in cell sizes */
+    double *difference; /* distance between the samples of central differences, in cell sizes */
     scene_file_lines *lines;
     scene_file_clip *clip;
 } scene_file_isosurface;
@@ -130,7 +130,7 @@ typedef struct scene_file_volume {
     scene_file_colour_map colours;
     double (*opacity)[2]; /* points of the opacity curve: position in the range, and opacity */
     int opacity_count;
-    double *unit_distance; /* length to which opacities refer, in scene units */
+    double *unit_distance; /* thickness of a layer to which opacities refer, in scene units */
     scene_file_clip *clip;
 } scene_file_volume;
 
@@ -174,8 +174,8 @@ typedef struct scene_file_layer {
 } scene_file_layer;
 
 typedef struct scene_file_sampling {
-    int *method;               /* samples or segments (scene_sampling_method) */
-    double *max_error;         /* bound of the error of segments in a colour channel */
+    int *method;               /* method for volumes: samples or segments (scene_sampling_method) */
+    double *max_error;         /* allowed error of a colour channel if the method is segments */
     double *step, *step_cells; /* distance between samples in scene units, or in mean cell sizes */
     bool *jitter, *reproducible;
     int *frames;         /* number of frames that are averaged */
@@ -255,7 +255,7 @@ typedef struct scene_file_image {
     double *every_time; /* interval of simulated time at which the image is drawn */
     scene_file_condition *when;
     bool *once;
-    int *antialias; /* number of positions in a pixel that frames use in turn */
+    int *antialias; /* number of sample positions in a pixel, which successive frames use in turn */
     scene_file_camera *camera;
     scene_file_sweep *sweep;
     double *background; /* background colour: red, green, blue and, if background_count is 4, opacity */
@@ -286,10 +286,10 @@ typedef struct scene_file_mesh {
 typedef struct scene_file {
     int *threads;          /* number of threads per rank */
     int *tree;             /* cells over which trees are built (scene_tree) */
-    int *schedule;         /* schedule of compositing (scene_schedule) */
+    int *schedule;         /* order in which ranks exchange fragments (scene_schedule) */
     int *writing;          /* when pictures are written: during the step or after it (scene_writing) */
-    int *finer_pieces;     /* number of pieces between two nodes of a cell of higher order */
-    double *surface_error; /* bound of the error of pieces, in pixels, by which the number of pieces is chosen */
+    int *finer_pieces;     /* number of linear pieces between two nodes of a cell of higher order */
+    double *surface_error; /* allowed error of linear pieces, in pixels, by which their number is chosen */
     double *finer_memory;  /* maximum memory of the pieces of cells of higher order, on all ranks together, in MiB */
     scene_file_image *images;
     int images_count;
@@ -327,16 +327,16 @@ typedef struct scene_form {
 
 typedef struct scene_mapping {
     const char *title;
-    const cyaml_schema_field_t *fields; /* fields of the mapping; the last entry has a NULL key */
-    const scene_key *keys;              /* one description per field, in the same order */
+    const cyaml_schema_field_t *fields; /* libcyaml's fields of the mapping; the last entry has a NULL key */
+    const scene_key *keys;              /* one description of a key per field, in the same order */
 } scene_mapping;
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* Limits of names: number of bytes of a name, number of names in a list or mapping, and number of bytes of a key that
- * the scene defines. libcyaml has no type for three kinds of values: a name or a list of names, a value of several
- * forms, and a mapping whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the
- * document (scene_document_texts(), scene_document_kind(), scene_document_names()). */
+/* Maximum number of bytes of a name, of names in a list or mapping, and of bytes of a key that the scene defines.
+ * libcyaml has no type for three kinds of values: a name or a list of names, a value of several forms, and a mapping
+ * whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the document
+ * (scene_document_texts(), scene_document_kind(), scene_document_names()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
 /* scene_top: the top-level mapping of a file, which is read into a scene_file; scene_top_value: the same mapping as a

@@ -10,7 +10,7 @@
 
 #include "scene_colour_names.h"
 
-/* The state of expanding the short forms of a document. */
+/* The state of replacing the short forms of values in a document by their full forms. */
 typedef struct rewrite {
     yaml_document_t *document;
     yaml_mark_t mark; /* position in the file of the value that is being rewritten; new nodes get the same position */
@@ -255,14 +255,15 @@ static void expand_meshes(rewrite *r, int *value)
     expand_mapping_to_named_list(r, NULL, value);
 }
 
-/* ---- whole documents --------------------------------------------------------------------------------------------- */
+/* ---- table of short forms, and expansion of a document ----------------------------------------------------------- */
 
 static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = "true or false";
 
 static const struct {
     const char *key;
     void (*expand)(rewrite *r, int *value);
-    const char *words; /* description of the short form; NULL if the schema's description already includes it */
+    /* description of the short form, for messages; NULL if the schema's description already includes it */
+    const char *words;
 } rules[] = {
     {"colour", expand_colour, NULL},
     {"background", expand_colour, NULL},
@@ -309,7 +310,7 @@ static void replace_word(char *text, size_t size, const char *from, const char *
     const char *behind = at + strlen(from) + (at[strlen(from)] == 's');
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
-    /* does not copy the NUL, because text may follow */
+    /* the NUL of `to` is not copied, because the rest of the text may follow */
     for (size_t i = 0; to[i]; i++) at[i] = to[i];
 }
 
@@ -376,7 +377,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
     return r.has_memory;
 }
 
-/* ---- words that are nearly correct ------------------------------------------------------------------------------- */
+/* ---- suggestions for unknown words ------------------------------------------------------------------------------- */
 
 enum { LONGEST_WORD = 63 };
 

@@ -17,7 +17,7 @@ enum { longest_quote = 40 };
 typedef struct text_line {
     const char *start;
     size_t length;
-    size_t indent; /* number of leading blanks and tabs; equal to the length of the line if it has nothing else */
+    size_t indent; /* number of leading blanks and tabs; equal to the length of a line that has nothing else */
     size_t number; /* index of the line, from 0 */
 } text_line;
 
@@ -195,7 +195,7 @@ static bool report_unclosed_quote(const fault *f, text_line l)
 /* Reports a quotation mark in an earlier line that is closed only by the quotation mark in this line. */
 static bool report_unclosed_quote_above(const fault *f, text_line l)
 {
-    const char *quote = NULL; /* the quotation mark that is open */
+    const char *quote = NULL; /* opening quotation mark that is not closed so far; NULL if there is none */
     text_line opened = l;
     for (text_line other = find_line(f->text, f->size, 0); other.number < l.number;
          other = find_next_line(other, f->text + f->size))
@@ -242,7 +242,8 @@ static bool report_unclosed_bracket(const fault *f, text_line l)
     return set_fault(f, l.number, "the %c of this line is not closed, expected %c", open, close);
 }
 
-/* Returns the last line with content before the line with index `number`; if there is none, returns the latter. */
+/* Returns the last line with content before the line with index `number`; if there is none, returns the line with this
+ * index. */
 static text_line find_previous_line(const fault *f, size_t number)
 {
     text_line found = find_line(f->text, f->size, number);
@@ -256,9 +257,9 @@ static bool is_list_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* Returns the earlier line with a key or list item whose indentation is nearest to that of this line. Keys in a list
- * item are indented by 2 more than the item, so that this indentation is also tested. *expected receives the
- * indentation that this line should probably have. */
+/* Returns the line with content, among those before this one, whose indentation is nearest to that of this line. If
+ * this line is a list item, only list items are searched. Otherwise the indentation of a list item counts as that of
+ * the keys in it, which is 2 more. *expected receives the indentation that this line should probably have. */
 static text_line find_nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
@@ -276,8 +277,8 @@ static text_line find_nearest_indent(const fault *f, text_line l, size_t *expect
     return nearest;
 }
 
-/* Reports a faulty line before this one: this line cannot continue the previous line, because the previous line lacks a
- * colon, or a blank after its hyphen. */
+/* Reports that the line before this one lacks a colon, or a blank after its hyphen, so that this line cannot continue
+ * it. */
 static bool report_incomplete_line(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
@@ -364,7 +365,7 @@ static bool report_bad_start(const fault *f)
                      (int)word_length(l.start + column, l.start + l.length), l.start + column);
 }
 
-/* ---- the search ------------------------------------------------------------------------------------------------- */
+/* ---- search for the mistake ------------------------------------------------------------------------------------- */
 
 static bool apply_rule_to_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
 {

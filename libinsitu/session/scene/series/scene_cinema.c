@@ -64,7 +64,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 {
     char file[96];
     const char *folder = in->cinema;
-    /* removes "./", so that a folder has one table even if the scene spells its path in several ways */
+    /* removes "./", so that folders that are written differently in the scene, but are the same, have one table */
     while (strncmp(folder, "./", 2) == 0) folder += 2;
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);

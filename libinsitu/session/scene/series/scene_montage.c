@@ -8,8 +8,8 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Returns the output's path, expanded for a sample cycle and time. Outputs are the same file if these paths are equal
- * (scene_outputs.c). */
+/* Returns the output's path, with a sample cycle and time inserted for its placeholders. Two outputs are the same file
+ * if these paths are equal (scene_outputs.c). */
 static char *expand_path_for_comparison(const scene_image *image, const scene_output *output, int view)
 {
     scene_placeholder_values moment = scene_make_placeholder_values(image, 123456789012345678, 0.5);

@@ -11,7 +11,7 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* ---- interpolation ----------------------------------------------------------------------------------------------- */
+/* ---- interpolation between points -------------------------------------------------------------------------------- */
 
 /* Number of values of a camera point that are interpolated: eye, focal point and up direction with three coordinates
  * each, and the angle of view. */
@@ -25,7 +25,8 @@ static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POIN
     out[9] = p->angle;
 }
 
-/* Times and values of four successive points. The first and the last point may be missing. */
+/* Times and values of four successive points of a camera's path; the value between the second and the third point is
+ * interpolated. has_first, has_last: whether the first and the last of the four points exist. */
 typedef struct cubic_points {
     double times[4], values[4];
     bool has_first, has_last;

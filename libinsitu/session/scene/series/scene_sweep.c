@@ -105,7 +105,7 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
     return INSITU_OK;
 }
 
-/* ---- reducing the layers to one variant -------------------------------------------------------------------------- */
+/* ---- reducing the layers to what one picture of a sweep shows ---------------------------------------------------- */
 
 static bool replace_field(scene_field *field, const char *name, int line)
 {
@@ -117,8 +117,8 @@ static bool replace_field(scene_field *field, const char *name, int line)
     return true;
 }
 
-/* Replaces the field that colours a layer. If the layer's contour lines are those of the field that colours it, they
- * become contour lines of the new field. */
+/* Replaces the field that colours a layer. If the layer's contour lines are contours of the same field, they become
+ * contour lines of the new field. */
 static bool replace_colours(scene_field *field, scene_lines *lines, const char *name, int line)
 {
     return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
