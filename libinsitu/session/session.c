@@ -14,11 +14,12 @@
  * hold the message. */
 static _Thread_local base_error thread_error;
 
-/* Report that is returned while a fill function runs, since the step's report is incomplete then. */
+/* Report that insitu_last_report() returns while a fill function (the caller's function that computes a field's values)
+ * is running, since the step's report is incomplete then. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
-/* Returns whether the call is refused because a fill function is running. In this case the error is recorded in the
- * session. The cast removes const, because recording the error is the only change of the session. */
+/* Returns whether a public call is refused because the caller makes it inside a fill function. In this case the error
+ * is recorded in the session. The cast removes const, because recording the error is the only change of the session. */
 static bool refuse_call_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_call_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);

@@ -17,12 +17,13 @@ typedef struct session_changes {
     bool are_names_shared;       /* set if all ranks have the same names of meshes and fields */
     bool needs_more_threads;     /* set if some rank has too few threads and must start more */
     bool has_unwritten_pictures; /* set if pictures of earlier steps could not be written */
-    bool is_filled;              /* set if some field has a fill function, which may call MPI */
-    bool writes_behind;          /* set if this step's pictures are written after the step is over */
-    int isa_level;               /* lowest instruction set of any rank (render_isa.h) */
-    int isa_rank;                /* lowest rank that has the instruction set isa_level */
-    int isa_best;                /* highest instruction set of any rank */
-    int reporting_rank;          /* lowest rank that has warnings for all ranks; -1: none */
+    /* set if some field has a fill function (a function of the caller that computes its values), which may call MPI */
+    bool is_filled;
+    bool writes_behind; /* set if this step's pictures are written after the step is over */
+    int isa_level;      /* lowest instruction set of any rank (render_isa.h) */
+    int isa_rank;       /* lowest rank that has the instruction set isa_level */
+    int isa_best;       /* highest instruction set of any rank */
+    int reporting_rank; /* lowest rank that has warnings for all ranks; -1: none */
 } session_changes;
 
 /* Determines what has changed on any rank, by one small reduction. Collective. */

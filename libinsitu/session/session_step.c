@@ -41,8 +41,8 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and frees all data that was created for images of the old scene. If the new scene divides
- * cells of higher order into other pieces, cells are marked as changed. */
+/* Reads the edited scene, and frees all data that was created for images of the old scene. If the new scene sets other
+ * limits for the number of pieces of cells of higher order, cells are marked as changed. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
     const scene old = s->scene_file.scene;
@@ -139,8 +139,8 @@ static insitu_status add_derived_fields(insitu_session *s, base_error *error)
 }
 
 /* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and creates
- * the mesh groups (session_mesh_groups.h). If creating the groups fails, the error is only stored in *error.
- * Collective. */
+ * the mesh groups, over which values are averaged at vertices (session_mesh_groups.h). If creating the groups fails,
+ * the error is only stored in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -169,9 +169,9 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Divides cells of higher order into finer pieces, unless the scene disables this. The images that are due determine
- * which cells are refined and, with surface_error, the number of pieces. *are_cells_changed is set if the pieces have
- * changed on any rank. Collective. */
+/* Divides cells of higher order into linear pieces that are smaller than the distance between nodes, unless the scene
+ * disables this. The images that are due determine which cells are divided and, with surface_error, the number of
+ * pieces. *are_cells_changed is set if the pieces have changed on any rank. Collective. */
 static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
                                   base_error *error)
 {
@@ -218,8 +218,8 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
 }
 
-/* Makes the plan. If fields turn out to be invalid when their values are read, makes another plan without the images
- * that use them. Collective. */
+/* Makes the step's plan: the images to draw and the data that they need (session_plan.h). If fields turn out to be
+ * invalid when their values are read, makes another plan without the images that use them. Collective. */
 static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
                                session_plan *plan, base_error *error)
 {
@@ -329,8 +329,8 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
     return draw_due_images(s, changes, &moment, &refused, error);
 }
 
-/* Returns the error of earlier steps' pictures that could not be written, unless this step has an error of its own.
- * Collective. */
+/* Stores in *error, on all ranks, the error of pictures of earlier steps that could not be written. Must be called only
+ * if this step has no error of its own. Collective. */
 static insitu_status report_unwritten_pictures(insitu_session *s, base_error *error)
 {
     base_error told = {.status = INSITU_OK};
@@ -340,8 +340,8 @@ static insitu_status report_unwritten_pictures(insitu_session *s, base_error *er
     return error->status;
 }
 
-/* Passes the text of report.json (session_news.h) to the writer. Called on rank 0 only; the next step returns the error
- * if this fails. */
+/* Passes the text of report.json (session_news.h) to the writer. Called on rank 0 only. If queuing the text fails, a
+ * later step returns the error; if memory for the text runs out, the file is not written. */
 static void queue_report_json(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;

@@ -1,5 +1,5 @@
-/* Computes the sizes and counts of the report. They are computed at the end of a step, instead of being tracked during
- * the step. */
+/* Computes the sizes of data and the numbers of cells in the step's report. They are computed at the end of a step,
+ * instead of being tracked during the step. */
 #include "session_summary.h"
 
 #include <stdarg.h>
@@ -50,8 +50,8 @@ static int64_t count_patch_bytes(const insitu_field *field)
     return bytes;
 }
 
-/* MOST_REASONS: maximum number of reasons for which data of a mesh is copied; REASON_SIZE: maximum size of a reason's
- * text in bytes. For each reason, the bytes of all blocks of a mesh are added up. */
+/* MOST_REASONS: maximum number of different reasons for which data of a mesh is copied; REASON_SIZE: maximum size of
+ * the text of a reason, in bytes. */
 enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 
 typedef struct copied_reasons {
