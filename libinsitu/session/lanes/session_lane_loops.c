@@ -306,7 +306,7 @@ LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
     }
 }
 
-LANE_INLINE void store_sizes(const lane_sizes *s, double shares, double root_of_shares, lane_sums *out)
+LANE_INLINE void store_sizes(const lane_sizes *s, double volume_factor, double root_of_factor, lane_sums *out)
 {
     double sum = 0, least = (double)INFINITY;
     out->inverted_count = 0;
@@ -316,8 +316,8 @@ LANE_INLINE void store_sizes(const lane_sizes *s, double shares, double root_of_
         least = s->least[lane] < least ? s->least[lane] : least;
         out->inverted_count -= s->inverted_counts[lane];
     }
-    out->least = least / shares;
-    out->size_sum = sum / root_of_shares;
+    out->least = least / volume_factor;
+    out->size_sum = sum / root_of_factor;
 }
 
 LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count, const int type,
@@ -325,7 +325,7 @@ LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t 
 {
     _Alignas(64) double volumes[BLOCK_CELLS];
     const lane_source s = make_lane_source(cells, type, wide_index, wide_number);
-    const double shares = find_cell_corners(type).volume_factor;
+    const double volume_factor = find_cell_corners(type).volume_factor;
     lane_bounds bounds = bounds_empty();
     lane_sizes sizes = sizes_empty();
     int64_t cell = 0;
@@ -342,7 +342,7 @@ LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t 
         if (cell < end) *scalar_count = end - cell < LANES ? end - cell : LANES;
     }
     store_bounds(&bounds, sums);
-    store_sizes(&sizes, shares, cbrt(shares), sums);
+    store_sizes(&sizes, volume_factor, cbrt(volume_factor), sums);
     return cell;
 }
 

@@ -76,12 +76,13 @@ static placeholder parse_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* Writes a number and returns its length. fewest: number of significant digits if the placeholder does not set any. */
-static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
+/* Writes a number and returns its length. default_digits: number of significant digits if the placeholder does not set
+ * any. */
+static int write_number(const placeholder *p, double value, int default_digits, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
     if (p->conversion == 'e') return snprintf(out, size, "%.*e", p->digits, value);
-    return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
+    return snprintf(out, size, "%.*g", p->digits < 0 ? default_digits : p->digits, value);
 }
 
 /* Writes the placeholder's value to `out`, which has space for `size` bytes, and returns its length. If `out` is NULL
