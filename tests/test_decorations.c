@@ -92,7 +92,7 @@ static void bands_of_ids_are_centred_on_the_ids(void **state)
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         const session_scale scale = {.kind = RENDER_LINEAR, .low = cases[n].low, .high = cases[n].high};
         insitu_tick ticks[SESSION_MAX_TICKS], plain[SESSION_MAX_TICKS];
-        const int count = session_make_band_ticks(&scale, cases[n].bands, 6, ticks);
+        const int count = session_make_ticks_for_colour_bands(&scale, cases[n].bands, 6, ticks);
         if (!cases[n].count) {
             assert_int_equal(count, session_make_ticks(&scale, 6, plain));
             for (int i = 0; i < count; i++) assert_true(ticks[i].place == plain[i].place);

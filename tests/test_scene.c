@@ -1385,13 +1385,13 @@ static void scene_texts_have_their_placeholders_replaced(void **state)
                  {"{", 1, "{"},
                  {"", 1, ""}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char *path =
-            scene_expand(cases[i].pattern, &(scene_placeholder_values){"wave", cases[i].cycle, 0.125, 3, 7, -0.5, "p"});
+        char *path = scene_expand_placeholders(
+            cases[i].pattern, &(scene_placeholder_values){"wave", cases[i].cycle, 0.125, 3, 7, -0.5, "p"});
         assert_string_equal(path, cases[i].path);
         base_free(path);
     }
     base_memory_fail_nth(1);
-    assert_null(scene_expand("a", &(scene_placeholder_values){"b", 1, 0, 0, 0, 0, NULL}));
+    assert_null(scene_expand_placeholders("a", &(scene_placeholder_values){"b", 1, 0, 0, 0, 0, NULL}));
     base_memory_fail_nth(0);
 }
 
@@ -1503,7 +1503,7 @@ static void derived_fields_are_sorted_and_read(void **state)
                 find_derived(&s, "s", &at)->kind == SCENE_STRAIN_RATE);
     const double x[2] = {3, -1}, y[2] = {2, 0.5};
     double stack[SCENE_STACK * SCENE_BLOCK];
-    scene_evaluate(&of->expression, (const double *const[]){x, y}, 2, stack);
+    scene_evaluate_expression(&of->expression, (const double *const[]){x, y}, 2, stack);
     assert_true(stack[0] == 2 && stack[1] == -2.25);
     scene_free(&s);
 }

@@ -141,7 +141,7 @@ static void sweeps_make_each_combination_once(void **state)
         assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces);
         assert_true(scene_is_first_variant(image) == (i == 0));
         const scene_placeholder_values moment = scene_make_placeholder_values(image, 5, 0);
-        char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
+        char expected[64], *path = scene_expand_placeholders(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%03d_%d_%s.png", i % 2, value + 1, fields[field]);
         assert_string_equal(path, expected);
         base_free(path);
@@ -172,7 +172,7 @@ static void sweeps_go_through_planes(void **state)
         assert_true(slice->planes[0].extent_fraction == (plane < 3 ? 0 : shares[plane - 3]));
         assert_true(scene_is_first_variant(image) == (i == 0));
         const scene_placeholder_values moment = scene_make_placeholder_values(image, 5, 0);
-        char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
+        char expected[64], *path = scene_expand_placeholders(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%d_%02d.png", 3 + i / 5, plane);
         assert_string_equal(path, expected);
         base_free(path);
@@ -304,7 +304,7 @@ static void camera_paths_interpolate_positions_and_stop_at_ends(void **state)
     assert_true(c->point_count == 4 && !c->is_automatic && !c->is_by_cycle);
     for (int i = 0; i < 4; i++) {
         const scene_camera_point *p = &c->points[i];
-        const scene_camera at = scene_camera_at(c, -7, p->at);
+        const scene_camera at = scene_compute_camera_at_time(c, -7, p->at);
         assert_memory_equal(at.eye, p->eye, sizeof at.eye);
         assert_memory_equal(at.focal, p->focal, sizeof at.focal);
         assert_memory_equal(at.up, p->up, sizeof at.up);
@@ -313,7 +313,7 @@ static void camera_paths_interpolate_positions_and_stop_at_ends(void **state)
     check_vector(c->points[2].up, 0, 0, 1);
     static const double beyond[] = {-1e300, 0.999, NAN, 5.5001, 1e300};
     for (int i = 0; i < 5; i++) {
-        const scene_camera at = scene_camera_at(c, 0, beyond[i]);
+        const scene_camera at = scene_compute_camera_at_time(c, 0, beyond[i]);
         assert_memory_equal(at.eye, c->points[i < 3 ? 0 : 3].eye, sizeof at.eye);
     }
     scene_free(&s);
@@ -330,7 +330,7 @@ static void camera_paths_of_two_positions_ease_in_and_out(void **state)
                  &s);
     for (int cycle = 0; cycle < 40; cycle++) {
         const double share = fmin(fmax((cycle - 10) / 20.0, 0), 1), way = share * share * (3 - 2 * share);
-        const scene_camera at = scene_camera_at(&s.images[0].camera, cycle, 1e9);
+        const scene_camera at = scene_compute_camera_at_time(&s.images[0].camera, cycle, 1e9);
         check_vector(at.eye, way, 5 * way, 8); /* a coordinate that does not change must remain bitwise equal */
         check_vector(at.focal, 0, 0, -2 * way);
         assert_true(at.eye[2] == 8);
@@ -350,15 +350,16 @@ static void camera_paths_are_smooth_without_overshoot(void **state)
     const scene_camera *c = &s.images[0].camera;
     for (int i = 0; i < 4; i++) {
         const double h = 1e-5, at = c->points[i].at;
-        const scene_camera before = scene_camera_at(c, 0, at - h), here = scene_camera_at(c, 0, at),
-                           after = scene_camera_at(c, 0, at + h);
+        const scene_camera before = scene_compute_camera_at_time(c, 0, at - h),
+                           here = scene_compute_camera_at_time(c, 0, at),
+                           after = scene_compute_camera_at_time(c, 0, at + h);
         for (int a = 0; a < 3; a++)
             assert_nearly_equal((after.eye[a] - here.eye[a]) / h, (here.eye[a] - before.eye[a]) / h,
                                 2 * 6 * h * 6 / 0.25);
     }
     for (int n = 0; n <= STEPS; n++) {
         const double time = 1 + 4.5 * n / STEPS;
-        const scene_camera at = scene_camera_at(c, 0, time);
+        const scene_camera at = scene_compute_camera_at_time(c, 0, time);
         int i = 0;
         while (i < 2 && time >= c->points[i + 1].at) i++;
         for (int a = 0; a < 3; a++) {
@@ -369,7 +370,7 @@ static void camera_paths_are_smooth_without_overshoot(void **state)
     }
     /* x rises by 4 in a time of 1, then by 2 in a time of 3. The slope at the position between them is 12 / (7 / 4 + 5
      * / (2 / 3)). */
-    assert_nearly_equal(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
+    assert_nearly_equal(scene_compute_camera_at_time(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
     scene_free(&s);
 }
 

@@ -199,11 +199,11 @@ static void dissimilar_words_get_no_suggestion(void **context)
     (void)context;
     static const char *const keys[] = {"field", "values", "opacity", "colour_by"};
     /* the exchange of two letters counts as one edit */
-    assert_string_equal(scene_nearest_word("vlaues", keys, 4), "values");
-    assert_string_equal(scene_nearest_word("opacty", keys, 4), "opacity");
-    assert_null(scene_nearest_word("threshold", keys, 4));
-    assert_null(scene_nearest_word("", keys, 4));
-    assert_null(scene_nearest_word("x", keys, 4));
+    assert_string_equal(scene_find_most_similar_word("vlaues", keys, 4), "values");
+    assert_string_equal(scene_find_most_similar_word("opacty", keys, 4), "opacity");
+    assert_null(scene_find_most_similar_word("threshold", keys, 4));
+    assert_null(scene_find_most_similar_word("", keys, 4));
+    assert_null(scene_find_most_similar_word("x", keys, 4));
 }
 
 int main(void)

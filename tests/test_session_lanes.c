@@ -148,7 +148,7 @@ static lane_sums compute_lane_sums(cpu_isa isa, const lane_cells *cells, int64_t
 {
     lane_sums sums;
     memset(&sums, 0, sizeof sums);
-    *taken = session_find_lane_run(isa, cells->g, cells->type)(cells, &sums, alone);
+    *taken = session_get_cell_loop_for_type(isa, cells->g, cells->type)(cells, &sums, alone);
     return sums;
 }
 

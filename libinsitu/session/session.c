@@ -150,7 +150,7 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
 
 /* Stores the error of a failed call, and returns its status. A successful call does not clear the message of an earlier
  * failed call; the next step clears it. */
-static insitu_status store_error(insitu_session *session, const base_error *error)
+static insitu_status store_error_in_session(insitu_session *session, const base_error *error)
 {
     if (error->status) session->error = *error;
     return error->status;
@@ -161,7 +161,7 @@ insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, co
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, SESSION_WHOLE, mesh, &error);
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, const insitu_field *field)
@@ -169,7 +169,7 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, SESSION_WHOLE, field, &error);
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t number, const insitu_mesh *block)
@@ -177,7 +177,7 @@ insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, i
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, number, block, &error);
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_name, int64_t block,
@@ -186,7 +186,7 @@ insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_n
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_set_block_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, block, field, &error);
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 insitu_status insitu_parameter(insitu_session *session, const char *name, double *value)
@@ -194,7 +194,7 @@ insitu_status insitu_parameter(insitu_session *session, const char *name, double
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
     session_read_parameter(&session->scene_file, &session->requested_parameters, name, value, &error);
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 insitu_status insitu_keep_pictures(insitu_session *session, int keep)
@@ -205,7 +205,7 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
     int is_on = keep != 0;
     if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
         session->kept_pictures.is_enabled = is_on;
-    return store_error(session, &error);
+    return store_error_in_session(session, &error);
 }
 
 const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)

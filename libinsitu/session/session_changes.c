@@ -44,21 +44,21 @@ enum change_word {
 /* Larger than any rank number. A rank r and a number n are packed into one word as n * rank_limit + r. */
 static const int64_t rank_limit = (int64_t)1 << 32;
 
-static int64_t bits_from_double(double value)
+static int64_t reinterpret_double_as_integer(double value)
 {
     int64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
-static double double_from_bits(int64_t bits)
+static double reinterpret_integer_as_double(int64_t bits)
 {
     double value;
     memcpy(&value, &bits, sizeof value);
     return value;
 }
 
-static bool has_filled_field(const session_meshes *meshes)
+static bool has_field_with_fill_function(const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++)
@@ -84,16 +84,16 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
     words[THREADS_LACKING] = session_needs_thread_trial(&session->threads, file->scene.threads, team->cores);
     words[UNWRITTEN] = session->writer.failure_count;
-    words[FILLED] = has_filled_field(meshes);
+    words[FILLED] = has_field_with_fill_function(meshes);
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_writes_after_step(&session->writer, &file->scene);
     words[ISA_LOW] = -(render_isa_level() * rank_limit + team->rank);
     words[ISA_HIGH] = render_isa_level();
     words[REPORTING_RANK] = session_encode_rank_with_warnings(&session->report, team);
-    words[ROOT_TIME] = team->rank == 0 ? bits_from_double(time) : INT64_MIN;
+    words[ROOT_TIME] = team->rank == 0 ? reinterpret_double_as_integer(time) : INT64_MIN;
 }
 
-insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
-                                   base_error *error)
+insitu_status session_reduce_changes_over_ranks(const insitu_session *session, int64_t cycle, double time,
+                                                session_changes *out, base_error *error)
 {
     int64_t mine[CHANGE_WORDS], all[CHANGE_WORDS];
     pack_changes(session, cycle, time, mine);
@@ -102,7 +102,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
     if (status) return status;
     *out = (session_changes){.cycle = all[CYCLE_HIGH],
                              .lowest_cycle = ~all[CYCLE_LOW],
-                             .time = double_from_bits(all[ROOT_TIME]),
+                             .time = reinterpret_integer_as_double(all[ROOT_TIME]),
                              .failed_rank = all[FAILED] ? session->team.ranks - (int)all[FAILED] : -1,
                              .is_scene_changed = all[SCENE_CHANGED],
                              .are_cells_changed = all[CELLS_CHANGED],
@@ -121,17 +121,18 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
     return INSITU_OK;
 }
 
-static void report_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *shared)
+static void broadcast_pending_error(int root, const session_meshes *meshes, const session_team *team,
+                                    base_error *shared)
 {
     const base_error *mine = session_find_pending_error(meshes);
     if (team->rank == root && mine) base_fail(shared, mine->status, "rank %d: %.900s", root, mine->message);
     session_broadcast_error(team->comm, root, shared);
 }
 
-insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
-                                  const session_team *team, base_error *refused, base_error *error)
+insitu_status session_check_errors_and_cycle(const session_changes *changes, const session_meshes *meshes,
+                                             const session_team *team, base_error *refused, base_error *error)
 {
-    if (changes->failed_rank >= 0) report_pending_error(changes->failed_rank, meshes, team, refused);
+    if (changes->failed_rank >= 0) broadcast_pending_error(changes->failed_rank, meshes, team, refused);
     if (changes->cycle == changes->lowest_cycle) return INSITU_OK;
     if (refused->status) *error = *refused;
     return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",

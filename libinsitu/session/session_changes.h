@@ -27,13 +27,13 @@ typedef struct session_changes {
 } session_changes;
 
 /* Determines what has changed on any rank, by one small reduction. Collective. */
-insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
-                                   base_error *error);
+insitu_status session_reduce_changes_over_ranks(const insitu_session *session, int64_t cycle, double time,
+                                                session_changes *out, base_error *error);
 
 /* Sends the error of a failed insitu_set_*() call from the lowest failed rank to all ranks, in *refused. The step
  * continues, because images that need neither the mesh nor the field can still be drawn. Returns an error if ranks are
  * at different cycles. Collective. */
-insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
-                                  const session_team *team, base_error *refused, base_error *error);
+insitu_status session_check_errors_and_cycle(const session_changes *changes, const session_meshes *meshes,
+                                             const session_team *team, base_error *refused, base_error *error);
 
 #endif

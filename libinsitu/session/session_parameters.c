@@ -9,7 +9,7 @@ static uint64_t hash_name(const char *name)
     return key;
 }
 
-static bool is_requested(const session_requested_names *requested, const char *name)
+static bool is_name_requested(const session_requested_names *requested, const char *name)
 {
     const uint64_t key = hash_name(name);
     for (int i = 0; i < requested->count && i < SESSION_MOST_REQUESTED; i++)
@@ -17,9 +17,9 @@ static bool is_requested(const session_requested_names *requested, const char *n
     return requested->count > SESSION_MOST_REQUESTED;
 }
 
-static void record_request(session_requested_names *requested, const char *name)
+static void record_requested_name(session_requested_names *requested, const char *name)
 {
-    if (is_requested(requested, name)) return;
+    if (is_name_requested(requested, name)) return;
     if (requested->count < SESSION_MOST_REQUESTED) requested->names[requested->count] = hash_name(name);
     requested->count++;
 }
@@ -30,13 +30,13 @@ insitu_status session_read_parameter(const session_scene_file *file, session_req
     char others[512];
     if (!name || !value)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: %s is NULL", name ? "value" : "name");
-    record_request(requested, name);
+    record_requested_name(requested, name);
     const scene_parameter *found = scene_find_parameter(&file->scene, name);
     if (found) {
         *value = found->value;
         return INSITU_OK;
     }
-    scene_list_parameters(&file->scene, name, others, sizeof others);
+    scene_describe_parameter_names(&file->scene, name, others, sizeof others);
     return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: \"%.63s\" is no parameter of %.300s%s", name,
                      file->path, others);
 }
@@ -47,7 +47,7 @@ void session_warn_of_unused_parameters(const scene *scene, const session_request
     for (int i = 0; i < scene->parameter_count; i++) {
         const char *name = scene->parameters[i].name;
         session_warn_locally(
-            report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_requested(requested, name),
+            report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_name_requested(requested, name),
             "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0", name);
     }
 }

@@ -84,8 +84,8 @@ static insitu_status broadcast_attachments(const session_team *team, scene_attac
 
 /* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names. It then sends the text
  * and the files to the other ranks, and they parse these. */
-static insitu_status parse_on_all_ranks(const char *path, const session_team *team, scene_file_text *text, scene *out,
-                                        base_error *error)
+static insitu_status parse_scene_on_all_ranks(const char *path, const session_team *team, scene_file_text *text,
+                                              scene *out, base_error *error)
 {
     scene parsed = {0};
     scene_attachments files = {.read = read_attachment};
@@ -104,7 +104,7 @@ static insitu_status parse_on_all_ranks(const char *path, const session_team *te
     return status;
 }
 
-static bool is_same_file(const struct stat *a, const struct stat *b)
+static bool is_same_file_state(const struct stat *a, const struct stat *b)
 {
     return a->st_ino == b->st_ino && a->st_dev == b->st_dev && a->st_size == b->st_size &&
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
@@ -112,7 +112,7 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
 
 /* Copies the caller's text as if it had been read from a file. A text that is longer than the limit for scenes is
  * truncated here; parsing then refuses it. */
-static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
+static insitu_status copy_given_scene_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
     text->data = base_alloc((size_t)text->size + 1);
@@ -123,18 +123,18 @@ static insitu_status copy_text(const char *given, scene_file_text *text, base_er
 
 /* Reads the scene, sends it to all ranks and parses it. given: the scene's text, or NULL to read the file. If memory
  * runs out, the file is treated as not read, so that the next step tries again. */
-static insitu_status read_scene(session_scene_file *file, const session_team *team, const char *given, scene *out,
-                                base_error *error)
+static insitu_status read_and_parse_scene(session_scene_file *file, const session_team *team, const char *given,
+                                          scene *out, base_error *error)
 {
     scene_file_text text = {0};
     if (team->rank == 0) {
         if (given)
-            copy_text(given, &text, error);
+            copy_given_scene_text(given, &text, error);
         else
             read_file(file->path, &text, error);
     }
     insitu_status status = session_agree_without_rank(team->comm, error);
-    if (status == INSITU_OK) status = parse_on_all_ranks(file->path, team, &text, out, error);
+    if (status == INSITU_OK) status = parse_scene_on_all_ranks(file->path, team, &text, out, error);
     if (team->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
         file->stamp = text.stamp;
         file->has_stamp = true;
@@ -166,7 +166,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 {
     file->is_text = source->text;
     const insitu_status status = broadcast_path(file, team, source, error);
-    return status ? status : read_scene(file, team, source->text, &file->scene, error);
+    return status ? status : read_and_parse_scene(file, team, source->text, &file->scene, error);
 }
 
 bool session_is_scene_edited(const session_scene_file *file, int rank)
@@ -174,7 +174,7 @@ bool session_is_scene_edited(const session_scene_file *file, int rank)
     struct stat now;
     /* if an editor has removed the file for a moment, a later step reads it */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
-    return !file->has_stamp || !is_same_file(&now, &file->stamp);
+    return !file->has_stamp || !is_same_file_state(&now, &file->stamp);
 }
 
 bool session_reload_scene(session_scene_file *file, const session_team *team)
@@ -183,7 +183,7 @@ bool session_reload_scene(session_scene_file *file, const session_team *team)
     base_error error = {0};
     base_free(file->warning);
     file->warning = NULL;
-    if (read_scene(file, team, NULL, &edited, &error) != INSITU_OK) {
+    if (read_and_parse_scene(file, team, NULL, &edited, &error) != INSITU_OK) {
         file->warning = base_strdup(error.message);
         return false;
     }

@@ -36,7 +36,7 @@
 #include "session_vertex_order.h"
 #include "session_warped.h"
 
-static double milliseconds_since(double start)
+static double get_milliseconds_since(double start)
 {
     return 1e3 * (MPI_Wtime() - start);
 }
@@ -84,7 +84,7 @@ static void select_lowest_instruction_set(const session_changes *changes, sessio
                  cpu_isa_name((cpu_isa)changes->isa_best));
 }
 
-static void warn_of_environment(const session_team *team, session_report *report)
+static void warn_of_isa_setting(const session_team *team, session_report *report)
 {
     const char *isa = render_isa_warning();
     session_warn_locally(report, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "rank %d: %s",
@@ -98,7 +98,8 @@ static session_derive_basis make_derive_basis(insitu_session *s)
 
 /* Computes the derived fields that the step's statistics and conditions use. Collective; all ranks return the same
  * status. */
-static insitu_status derive_for_events(insitu_session *s, const session_moment *moment, bool images, base_error *error)
+static insitu_status derive_fields_for_statistics(insitu_session *s, const session_moment *moment, bool images,
+                                                  base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
     const uint64_t needed = session_find_derived_fields_of_events(scene, moment->cycle, images);
@@ -124,7 +125,7 @@ static void update_statistics_and_conditions(insitu_session *s, session_plan_bas
     if (session_are_any_statistics_needed(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
         const session_valid_events valid = session_check_event_fields(basis, images, error);
-        if (derive_for_events(s, moment, images, &own) == INSITU_OK)
+        if (derive_fields_for_statistics(s, moment, images, &own) == INSITU_OK)
             session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
                                                &valid, &own);
         if (!error->status) *error = own;
@@ -141,7 +142,8 @@ static insitu_status add_derived_fields(insitu_session *s, base_error *error)
 /* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and creates
  * the mesh groups, over which values are averaged at vertices (session_mesh_groups.h). If creating the groups fails,
  * the error is only stored in *error. Collective. */
-static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
+static insitu_status update_catalogue_and_mesh_groups(insitu_session *s, bool are_names_new, bool is_shared,
+                                                      base_error *error)
 {
     insitu_status status = INSITU_OK;
     if (are_names_new) status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, is_shared, error);
@@ -152,7 +154,7 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
 
 /* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set if this changes cells or
  * coordinates on any rank. Collective. */
-static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
+static insitu_status warp_and_mirror_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
     const bool is_any = scene->warp_count > 0 || scene->mirror_count > 0;
@@ -172,8 +174,8 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
 /* Divides cells of higher order into linear pieces that are smaller than the distance between nodes, unless the scene
  * disables this. The images that are due determine which cells are divided and, with surface_error, the number of
  * pieces. *are_cells_changed is set if the pieces have changed on any rank. Collective. */
-static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
-                                  base_error *error)
+static insitu_status subdivide_higher_order_cells(insitu_session *s, const session_moment *moment,
+                                                  bool *are_cells_changed, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
     const session_pieces_basis basis = {scene, moment, *are_cells_changed, &s->catalogue, &s->team, &s->meshes};
@@ -184,7 +186,7 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
     insitu_status status = session_agree(s->team.comm, error);
     if (!status) status = session_count_higher_order_cells(&s->meshes, &s->catalogue, s->team.comm, choices, error);
-    if (!status) status = session_choose_pieces(&basis, choices, &s->report, error);
+    if (!status) status = session_choose_higher_order_pieces(&basis, choices, &s->report, error);
     if (!status)
         status = session_make_finer_lattices(&s->meshes, &s->catalogue, choices, &s->team, &are_changed, error);
     session_free_choices(choices, s->catalogue.mesh_count);
@@ -203,16 +205,17 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     base_error reason = {.status = INSITU_OK};
     bool are_cells_changed = changes->are_cells_changed;
     if (changes->are_levels_changed && session_update_covered_cells(&s->meshes, team, error)) return error->status;
-    if (transform_meshes(s, &are_cells_changed, error)) return error->status;
+    if (warp_and_mirror_meshes(s, &are_cells_changed, error)) return error->status;
     if (are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
     if (are_cells_changed) session_invalidate_homes(&s->catalogue);
     if (scene->finer_pieces != 1) session_drop_vertex_ids(&s->meshes);
-    insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
+    insitu_status status =
+        update_catalogue_and_mesh_groups(s, of_names, changes->are_names_shared && !refused->status, error);
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team, &s->report, error);
-    if (!status) status = refine_cells(s, moment, &are_cells_changed, error);
+    if (!status) status = subdivide_higher_order_cells(s, moment, &are_cells_changed, error);
     if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if (!status) session_check_warps(scene, &s->catalogue, &s->report);
     return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
@@ -220,15 +223,15 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
 
 /* Makes the step's plan: the images to draw and the data that they need (session_plan.h). If fields turn out to be
  * invalid when their values are read, makes another plan without the images that use them. Collective. */
-static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
-                               session_plan *plan, base_error *error)
+static insitu_status plan_images_without_invalid_fields(insitu_session *s, const session_plan_basis *basis,
+                                                        base_error *refused, session_plan *plan, base_error *error)
 {
     insitu_status status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     if (status == INSITU_ERROR_FIELD || status == INSITU_ERROR_ARGUMENT) {
         if (!refused->status) *refused = *error;
         *error = (base_error){0};
         session_restore_excluded(&s->meshes);
-        status = list_meshes(s, true, false, error);
+        status = update_catalogue_and_mesh_groups(s, true, false, error);
         if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     }
     if (!status && refused->status) plan->refusal = *refused;
@@ -270,7 +273,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     insitu_status status = update_meshes(s, changes, moment, refused, error);
     if (!status) status = session_make_discontinuous(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_statistics_and_conditions(s, &basis, &of_events);
-    if (!status) status = make_plan(s, &basis, refused, &plan, error);
+    if (!status) status = plan_images_without_invalid_fields(s, &basis, refused, &plan, error);
     const session_derive_basis derived = make_derive_basis(s);
     if (!status)
         status = session_compute_derived(&derived, session_find_derived_fields_of_plan(basis.scene, &plan), error);
@@ -283,7 +286,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) session_find_changed_values(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
-    s->report.public_report.prepare_ms = milliseconds_since(start);
+    s->report.public_report.prepare_ms = get_milliseconds_since(start);
     /* a phase above may have stored an error in *error without returning it; the next session_agree() returns it on all
      * ranks */
     if (!status) {
@@ -300,8 +303,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
 }
 
 /* Performs all phases of a step after the first reduction; draws images if any are due. */
-static insitu_status run_phases(insitu_session *s, session_changes *changes, const session_guard *guard,
-                                base_error *error)
+static insitu_status run_phases_of_step(insitu_session *s, session_changes *changes, const session_guard *guard,
+                                        base_error *error)
 {
     s->report.public_report.time = changes->time;
     if (changes->is_scene_changed) {
@@ -311,7 +314,7 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
     if (s->team.rank == 0) s->report.public_report.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
     session_store_first_cinema_cycle(&s->cinema, changes->cycle);
     base_error refused = {.status = INSITU_OK};
-    insitu_status status = session_check_input(changes, &s->meshes, &s->team, &refused, error);
+    insitu_status status = session_check_errors_and_cycle(changes, &s->meshes, &s->team, &refused, error);
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
     s->last_time = changes->time;
@@ -331,7 +334,7 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
 
 /* Stores in *error, on all ranks, the error of pictures of earlier steps that could not be written. Must be called only
  * if this step has no error of its own. Collective. */
-static insitu_status report_unwritten_pictures(insitu_session *s, base_error *error)
+static insitu_status share_error_of_unwritten_pictures(insitu_session *s, base_error *error)
 {
     base_error told = {.status = INSITU_OK};
     if (s->team.rank == 0) told = session_writer_take_failure(&s->writer);
@@ -374,22 +377,23 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
     session_writer_collect_results(&session->writer, &session->report);
-    warn_of_environment(&session->team, &session->report);
+    warn_of_isa_setting(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
         session_warn_of_unused_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
-    insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
+    insitu_status status = session_reduce_changes_over_ranks(session, cycle, time, &changes, &session->error);
     if (!status && changes.reporting_rank >= 0)
         status = session_broadcast_warnings(&session->report, changes.reporting_rank, &session->team, &session->error);
     if (!status) {
-        status = run_phases(session, &changes, &guard, &session->error);
+        status = run_phases_of_step(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);
-        if (!status && changes.has_unwritten_pictures) status = report_unwritten_pictures(session, &session->error);
+        if (!status && changes.has_unwritten_pictures)
+            status = share_error_of_unwritten_pictures(session, &session->error);
     }
     queue_report_json(session);
-    session_complete_report(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
-                            &session->report);
+    session_add_memory_and_warnings(&session->meshes, &session->trees.parent, &session->writer,
+                                    session->scene_file.warning, &session->report);
     session_release_filled_arrays(&session->meshes);
-    session->report.public_report.total_ms = milliseconds_since(start);
+    session->report.public_report.total_ms = get_milliseconds_since(start);
     session_guard_restore_settings(&guard);
     return status;
 }

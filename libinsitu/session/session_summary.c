@@ -60,8 +60,8 @@ typedef struct copied_reasons {
     char texts[MOST_REASONS][REASON_SIZE];
 } copied_reasons;
 
-__attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *reasons, int64_t bytes, const char *format,
-                                                             ...)
+__attribute__((format(printf, 3, 4))) static void add_copied_bytes_with_reason(copied_reasons *reasons, int64_t bytes,
+                                                                               const char *format, ...)
 {
     char words[REASON_SIZE];
     int at = 0;
@@ -80,7 +80,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     reasons->bytes[at] += bytes;
 }
 
-static void report_copied(const copied_reasons *reasons, const char *mesh, session_report *out)
+static void report_copied_bytes_of_mesh(const copied_reasons *reasons, const char *mesh, session_report *out)
 {
     for (int i = 0; i < reasons->count; i++) {
         out->public_report.bytes_copied += reasons->bytes[i];
@@ -89,14 +89,14 @@ static void report_copied(const copied_reasons *reasons, const char *mesh, sessi
     }
 }
 
-static bool is_field_in_use(const session_mesh *mesh, int field)
+static bool is_field_shown_or_displacement(const session_mesh *mesh, int field)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
         if (mesh->scalars[i].field == field) return true;
     return mesh->fields[field].is_displacement;
 }
 
-static int64_t value_bytes(const insitu_field *field)
+static int64_t count_value_bytes(const insitu_field *field)
 {
     int64_t bytes = count_array_bytes(&field->values, field->count) * field->component_count;
     for (int c = 0; field->components && c < field->component_count; c++)
@@ -104,44 +104,47 @@ static int64_t value_bytes(const insitu_field *field)
     return bytes;
 }
 
-static void report_field(session_report *out, copied_reasons *copied, const session_mesh *mesh, int index)
+static void report_memory_of_field(session_report *out, copied_reasons *copied, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
     const int64_t copied_bytes = mesh->fields[index].has_borrowed_copy ? 0 : mesh->fields[index].copy_bytes;
-    add_copied(copied, copied_bytes, "field \"%s\" %s", field->name,
-               mesh->fields[index].is_derived ? "derived from others"
-               : mesh->finer.parts            ? "in finer cells of higher order"
-               : field->index.data            ? "by its index"
-               : field->corner_row            ? "in rows of corners"
-                                              : "at the corners of a discontinuous mesh");
-    if (is_field_in_use(mesh, index) && !mesh->source)
+    add_copied_bytes_with_reason(copied, copied_bytes, "field \"%s\" %s", field->name,
+                                 mesh->fields[index].is_derived ? "derived from others"
+                                 : mesh->finer.parts            ? "in finer cells of higher order"
+                                 : field->index.data            ? "by its index"
+                                 : field->corner_row            ? "in rows of corners"
+                                                                : "at the corners of a discontinuous mesh");
+    if (is_field_shown_or_displacement(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
-            value_bytes(field) + count_array_bytes(&field->index, session_count_field_entries(&mesh->original, field)) +
+            count_value_bytes(field) +
+            count_array_bytes(&field->index, session_count_field_entries(&mesh->original, field)) +
             count_patch_bytes(field);
 }
 
-static void report_scalar(session_report *out, copied_reasons *copied, const session_mesh *mesh,
-                          const session_scalar *scalar)
+static void report_memory_of_scalar(session_report *out, copied_reasons *copied, const session_mesh *mesh,
+                                    const session_scalar *scalar)
 {
     const char *name = session_get_scalar_name(mesh, scalar);
     const int64_t vertices = session_vertex_count(mesh);
     if (scalar->node_ranges) out->public_report.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
         const insitu_centring centring = mesh->fields[scalar->field].given.centring;
-        add_copied(copied, vertices * (int64_t)sizeof(double), "field \"%s\" recentred from %s to vertices", name,
-                   centring == INSITU_CELL     ? "cells"
-                   : centring == INSITU_CORNER ? "corners"
-                                               : "levels of refinement");
+        add_copied_bytes_with_reason(copied, vertices * (int64_t)sizeof(double),
+                                     "field \"%s\" recentred from %s to vertices", name,
+                                     centring == INSITU_CELL     ? "cells"
+                                     : centring == INSITU_CORNER ? "corners"
+                                                                 : "levels of refinement");
     }
     if (scalar->gradients)
-        add_copied(copied,
-                   vertices * (int64_t)sizeof *scalar->gradient_indices +
-                       scalar->gradient_count * (int64_t)sizeof *scalar->gradients,
-                   "gradients of field \"%s\" at vertices", name);
-    if (scalar->distances) add_copied(copied, vertices * (int64_t)sizeof(float), "distances of vertices from a slice");
+        add_copied_bytes_with_reason(copied,
+                                     vertices * (int64_t)sizeof *scalar->gradient_indices +
+                                         scalar->gradient_count * (int64_t)sizeof *scalar->gradients,
+                                     "gradients of field \"%s\" at vertices", name);
+    if (scalar->distances)
+        add_copied_bytes_with_reason(copied, vertices * (int64_t)sizeof(float), "distances of vertices from a slice");
 }
 
-static void report_outer(session_report *out, copied_reasons *copied, const session_mesh *mesh)
+static void report_memory_of_outer_meshes(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     int64_t bytes = 0;
     for (int i = 0; i < mesh->outer_count; i++) {
@@ -150,35 +153,41 @@ static void report_outer(session_report *out, copied_reasons *copied, const sess
         bytes += outer->bytes;
         out->public_report.bytes_trees += outer->mesh->has_tree ? mmbvh_bytes(&outer->mesh->tree) : 0;
     }
-    add_copied(copied, bytes, "its outer faces");
+    add_copied_bytes_with_reason(copied, bytes, "its outer faces");
 }
 
-static void report_topology(session_report *out, copied_reasons *copied, const session_mesh *mesh)
+static void report_recognised_and_split_cells(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     const session_topology *t = &mesh->topology;
     out->public_report.cells_recognised += mesh->source ? 0 : t->recognised_count;
     if (t->recognised_count)
-        add_copied(copied, t->cell_bytes,
-                   "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
-                   (long long)t->recognised_count, (long long)t->polyhedron_count);
+        add_copied_bytes_with_reason(
+            copied, t->cell_bytes,
+            "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
+            (long long)t->recognised_count, (long long)t->polyhedron_count);
     else if (t->is_split)
-        add_copied(copied, t->cell_bytes, "%lld linear pieces of its cells of higher order", (long long)t->cell_count);
+        add_copied_bytes_with_reason(copied, t->cell_bytes, "%lld linear pieces of its cells of higher order",
+                                     (long long)t->cell_count);
     else if (t->has_own_order)
-        add_copied(copied, t->cell_bytes, "its cells' vertices, one after the other in VTK's order");
+        add_copied_bytes_with_reason(copied, t->cell_bytes, "its cells' vertices, one after the other in VTK's order");
     else
-        add_copied(copied, t->cell_bytes, "its cells' faces, by owner and neighbour");
-    add_copied(copied, t->face_bytes, "its faces' vertices, out of lists");
-    add_copied(copied, mesh->conformed.bytes, "arrays that are not aligned or of types that are not read in place");
-    add_copied(copied, mesh->lattice.bytes, "coordinates along the axes of its lattice");
-    add_copied(copied, mesh->mirrored.bytes, "coordinates of its mirror images");
-    add_copied(copied, mesh->warp.bytes, "coordinates of its vertices where the scene's warp moves them");
-    if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
-    add_copied(copied, mesh->finer.bytes, "nodes of finer cells, with %d piece%s between two nodes", mesh->finer.parts,
-               mesh->finer.parts > 1 ? "s" : "");
-    add_copied(copied, mesh->discontinuous.bytes, "vertices of each cell's own, for fields with values at corners");
+        add_copied_bytes_with_reason(copied, t->cell_bytes, "its cells' faces, by owner and neighbour");
+    add_copied_bytes_with_reason(copied, t->face_bytes, "its faces' vertices, out of lists");
+    add_copied_bytes_with_reason(copied, mesh->conformed.bytes,
+                                 "arrays that are not aligned or of types that are not read in place");
+    add_copied_bytes_with_reason(copied, mesh->lattice.bytes, "coordinates along the axes of its lattice");
+    add_copied_bytes_with_reason(copied, mesh->mirrored.bytes, "coordinates of its mirror images");
+    add_copied_bytes_with_reason(copied, mesh->warp.bytes,
+                                 "coordinates of its vertices where the scene's warp moves them");
+    if (mesh->covered)
+        add_copied_bytes_with_reason(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
+    add_copied_bytes_with_reason(copied, mesh->finer.bytes, "nodes of finer cells, with %d piece%s between two nodes",
+                                 mesh->finer.parts, mesh->finer.parts > 1 ? "s" : "");
+    add_copied_bytes_with_reason(copied, mesh->discontinuous.bytes,
+                                 "vertices of each cell's own, for fields with values at corners");
 }
 
-static void report_part(session_report *out, copied_reasons *copied, const session_mesh *mesh)
+static void report_cells_and_memory_of_part(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     insitu_report *report = &out->public_report;
     int64_t unusable = 0;
@@ -187,7 +196,7 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
         report->cells += session_cell_count(mesh);
         report->bytes_borrowed += count_mesh_bytes(&mesh->original);
     }
-    report_topology(out, copied, mesh);
+    report_recognised_and_split_cells(out, copied, mesh);
     if (!mesh->is_check_stale && !mesh->source) {
         report->cells_ghost += mesh->given_counts.ghost_count;
         report->cells_inverted += mesh->given_counts.inverted_count;
@@ -195,19 +204,19 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
         report->cells_shell += mesh->given_counts.shell_count;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
-    for (int i = 0; i < mesh->field_count; i++) report_field(out, copied, mesh, i);
+    for (int i = 0; i < mesh->field_count; i++) report_memory_of_field(out, copied, mesh, i);
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
-        report_scalar(out, copied, mesh, scalar);
+        report_memory_of_scalar(out, copied, mesh, scalar);
         if (!scalar->is_used || !scalar->needs_ranges || mesh->source) continue;
         const int64_t count = session_count_unusable_cells(mesh, scalar);
         unusable = count > unusable ? count : unusable;
     }
     report->cells_unusable += unusable;
-    report_outer(out, copied, mesh);
+    report_memory_of_outer_meshes(out, copied, mesh);
 }
 
-static bool is_shown(const session_mesh *mesh)
+static bool is_mesh_or_outer_surface_shown(const session_mesh *mesh)
 {
     bool is_any = mesh->is_needed;
     for (int i = 0; i < mesh->outer_count; i++) is_any = is_any || mesh->outers[i]->is_needed;
@@ -215,7 +224,7 @@ static bool is_shown(const session_mesh *mesh)
 }
 
 /* Returns the number of the caller's cells that the mesh's tree contains. */
-static int64_t count_tree_cells(const session_mesh *mesh)
+static int64_t count_cells_in_tree(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? session_count_cells_of_pieces(mesh, mesh->tree.cells, mesh->tree.cell_count)
                                    : mesh->tree.cell_count;
@@ -223,7 +232,7 @@ static int64_t count_tree_cells(const session_mesh *mesh)
 
 /* Reports the data of a mesh that pictures leave out: fields and meshes that no image uses, and cells that trees do not
  * contain. All blocks of a mesh have the same fields, and each field is reported one time. */
-static void report_unused_data(session_report *out, const session_parts *parts)
+static void report_data_not_shown(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];
     int64_t shown = 0, drawn = 0, given = 0, partial = 0;
@@ -231,14 +240,14 @@ static void report_unused_data(session_report *out, const session_parts *parts)
         const session_mesh *part = parts->items[i];
         if (part->source) continue;
         given += part->is_given;
-        shown += part->is_given && is_shown(part);
+        shown += part->is_given && is_mesh_or_outer_surface_shown(part);
         if (!part->is_given || !part->is_needed) continue;
         drawn += part->given_counts.drawn_count;
-        if (part->is_partial) partial += part->given_counts.drawn_count - count_tree_cells(part);
+        if (part->is_partial) partial += part->given_counts.drawn_count - count_cells_in_tree(part);
     }
     if (!given || !out->public_report.images) return;
     for (int i = 0; i < first->field_count; i++)
-        if (!is_field_in_use(first, i))
+        if (!is_field_shown_or_displacement(first, i))
             session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", first->name,
                              first->fields[i].given.name);
     if (!shown) session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", first->name);
@@ -248,22 +257,22 @@ static void report_unused_data(session_report *out, const session_parts *parts)
                          first->name, (long long)partial, (long long)drawn);
 }
 
-static void report_parts(session_report *out, const session_parts *parts)
+static void report_mesh_from_its_parts(session_report *out, const session_parts *parts)
 {
     copied_reasons copied = {.count = 0};
-    for (int i = 0; i < parts->count; i++) report_part(out, &copied, parts->items[i]);
-    report_copied(&copied, parts->items[0]->name, out);
-    report_unused_data(out, parts);
+    for (int i = 0; i < parts->count; i++) report_cells_and_memory_of_part(out, &copied, parts->items[i]);
+    report_copied_bytes_of_mesh(&copied, parts->items[0]->name, out);
+    report_data_not_shown(out, parts);
 }
 
-void session_complete_report(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
-                             const char *scene_warning, session_report *out)
+void session_add_memory_and_warnings(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
+                                     const char *scene_warning, session_report *out)
 {
     insitu_report *report = &out->public_report;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_find_parts_from_index(meshes, i);
-        report_parts(out, &parts);
+        report_mesh_from_its_parts(out, &parts);
         i += parts.count;
     }
     report->bytes_trees += mmbvh_bytes(parent);

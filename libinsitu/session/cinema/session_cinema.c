@@ -200,7 +200,7 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
     insitu_status status = t->has_earlier_lines ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
     if (!t->has_lines_of_step && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
-    char *file = scene_expand(output->path + output->folder_bytes, moment);
+    char *file = scene_expand_placeholders(output->path + output->folder_bytes, moment);
     if (!file || !c_locale_enter(&numbers)) {
         base_free(file);
         return fail_memory(database, "data.csv", "written", error);

@@ -88,7 +88,7 @@ void session_record_written_files(session_overwrites *all, const scene *scene, i
         if (output->montage >= 0 && output->first_panel + drawn->variant.view > 0)
             continue; /* all panels of a montage are in one file, so that only the output of the first panel is
                          recorded */
-        char *path = scene_expand(drawn->outputs[i].path, &moment);
+        char *path = scene_expand_placeholders(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);
         const int before = find_output_that_wrote_file(all, file, first + i, cycle);

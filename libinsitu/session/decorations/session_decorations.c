@@ -52,7 +52,8 @@ static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 
 /* Returns whether the eye sees the outer side of the face of the box that is perpendicular to `axis`, at the high end
  * of the box if `high` is set, and otherwise at the low end. */
-static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
+static bool is_outer_side_of_face_visible(const double lower[3], const double upper[3], const render_camera *c,
+                                          int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
     return high ? c->eye[axis] > upper[axis] : c->eye[axis] < lower[axis];
@@ -77,8 +78,8 @@ int session_compute_box_strokes(const double lower[3], const double upper[3], co
         insitu_stroke *stroke = &strokes[count++];
         project_to_pixel(camera, &p, stroke->from);
         project_to_pixel(camera, &q, stroke->to);
-        stroke->is_behind =
-            !is_seen_outside(lower, upper, camera, b, high_b) && !is_seen_outside(lower, upper, camera, c, high_c);
+        stroke->is_behind = !is_outer_side_of_face_visible(lower, upper, camera, b, high_b) &&
+                            !is_outer_side_of_face_visible(lower, upper, camera, c, high_c);
     }
     return count;
 }
@@ -96,7 +97,8 @@ typedef struct ruled_edge {
     bool is_in_front, is_outer;
 } ruled_edge;
 
-static ruled_edge find_edge(const double lower[3], const double upper[3], const render_camera *c, int axis, int corner)
+static ruled_edge project_box_edge(const double lower[3], const double upper[3], const render_camera *c, int axis,
+                                   int corner)
 {
     const int b = (axis + 1) % 3, d = (axis + 2) % 3;
     const bool high_b = corner & 1, high_d = corner & 2;
@@ -120,7 +122,8 @@ static ruled_edge find_edge(const double lower[3], const double upper[3], const 
     const double side = (centre[0] - e.pixels[0][0]) * y - (centre[1] - e.pixels[0][1]) * x < 0 ? 1 : -1;
     e.outward[0] = side * y / length;
     e.outward[1] = -side * x / length;
-    e.is_outer = is_seen_outside(lower, upper, c, b, high_b) != is_seen_outside(lower, upper, c, d, high_d);
+    e.is_outer = is_outer_side_of_face_visible(lower, upper, c, b, high_b) !=
+                 is_outer_side_of_face_visible(lower, upper, c, d, high_d);
     return e;
 }
 
@@ -131,7 +134,7 @@ static bool is_better_ruler_edge(const ruled_edge *a, const ruled_edge *b)
     return a->pixels[0][1] + a->pixels[1][1] > b->pixels[0][1] + b->pixels[1][1];
 }
 
-static insitu_label make_label(const double at[2], const double away[2], double gap, const char *text)
+static insitu_label make_label_beside_edge(const double at[2], const double away[2], double gap, const char *text)
 {
     insitu_label out = {{at[0], at[1]}, {away[0], away[1]}, gap, ""};
     snprintf(out.text, sizeof out.text, "%s", text);
@@ -141,7 +144,7 @@ static insitu_label make_label(const double at[2], const double away[2], double 
 /* Computes the position of the name of the edge's axis. It is the middle of the edge or, if the numbers are beside the
  * edge rather than below it, midway between the two neighbouring ticks that are nearest to the middle, so that the name
  * does not overlap a number. */
-static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
+static void compute_axis_name_position(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
 {
     double middle[2], least = INFINITY;
     for (int a = 0; a < 2; a++) at[a] = middle[a] = 0.5 * (e->pixels[0][a] + e->pixels[1][a]);
@@ -158,8 +161,8 @@ static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int
 
 /* Draws ticks, numbers and the axis's name along an edge. The number of ticks is limited by the space for their
  * numbers. */
-static void draw_ruler(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
-                       insitu_stroke *strokes, insitu_label *labels)
+static void add_ticks_and_labels_along_edge(const ruled_edge *e, int axis, const render_camera *c, double size,
+                                            insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels)
 {
     static const char *const names[] = {"x", "y", "z"};
     insitu_tick ticks[SESSION_MAX_TICKS];
@@ -176,10 +179,10 @@ static void draw_ruler(const ruled_edge *e, int axis, const render_camera *c, do
         project_to_pixel(c, &seen, at);
         strokes[out->stroke_count++] = (insitu_stroke){
             {at[0], at[1]}, {at[0] + 0.35 * size * e->outward[0], at[1] + 0.35 * size * e->outward[1]}, false};
-        labels[out->label_count++] = make_label(at, e->outward, 0.55, ticks[i].text);
+        labels[out->label_count++] = make_label_beside_edge(at, e->outward, 0.55, ticks[i].text);
     }
-    place_axis_name(e, first, count, name_at);
-    labels[out->label_count++] = make_label(name_at, e->outward, 2.4, names[axis]);
+    compute_axis_name_position(e, first, count, name_at);
+    labels[out->label_count++] = make_label_beside_edge(name_at, e->outward, 2.4, names[axis]);
 }
 
 void session_add_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
@@ -188,10 +191,10 @@ void session_add_box_rulers(const double lower[3], const double upper[3], const 
     for (int axis = 0; axis < 3; axis++) {
         ruled_edge best = {.is_in_front = false};
         for (int corner = 0; corner < 4; corner++) {
-            const ruled_edge e = find_edge(lower, upper, camera, axis, corner);
+            const ruled_edge e = project_box_edge(lower, upper, camera, axis, corner);
             if (is_better_ruler_edge(&e, &best)) best = e;
         }
-        if (best.is_in_front) draw_ruler(&best, axis, camera, size, out, strokes, labels);
+        if (best.is_in_front) add_ticks_and_labels_along_edge(&best, axis, camera, size, out, strokes, labels);
     }
 }
 
@@ -225,10 +228,10 @@ static void choose_text_colour(const scene_image *image, float colour[3])
 }
 
 /* Adds a text to the decorations. Returns false if memory runs out. */
-static bool add_text(session_decorations *d, const char *text, const scene_placeholder_values *moment, insitu_anchor at,
-                     float size)
+static bool add_expanded_text(session_decorations *d, const char *text, const scene_placeholder_values *moment,
+                              insitu_anchor at, float size)
 {
-    char *expanded = scene_expand(text, moment);
+    char *expanded = scene_expand_placeholders(text, moment);
     if (expanded) d->words[d->decorations.words_count++] = (insitu_words){expanded, at, size};
     return expanded != NULL;
 }
@@ -236,9 +239,9 @@ static bool add_text(session_decorations *d, const char *text, const scene_place
 static bool add_scene_texts(session_decorations *d, const scene_decorations *scene,
                             const scene_placeholder_values *moment)
 {
-    bool well = !scene->title || add_text(d, scene->title, moment, INSITU_TOP, 1.4F);
+    bool well = !scene->title || add_expanded_text(d, scene->title, moment, INSITU_TOP, 1.4F);
     for (int i = 0; i < scene->words_count && well; i++)
-        well = add_text(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].anchor, 1);
+        well = add_expanded_text(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].anchor, 1);
     return well;
 }
 
@@ -259,7 +262,8 @@ static bool shows_magnitude(const session_catalogue *catalogue, const scene_fiel
 
 /* Writes the name of the scalar that a layer shows: |v| for the magnitude of a field v, "v x" or "v 7" for a
  * component. */
-static void write_name(const session_catalogue *catalogue, const scene_field *field, char *out, size_t size)
+static void write_name_of_shown_scalar(const session_catalogue *catalogue, const scene_field *field, char *out,
+                                       size_t size)
 {
     static const char *const axes[] = {"x", "y", "z"};
     if (shows_magnitude(catalogue, field))
@@ -272,21 +276,21 @@ static void write_name(const session_catalogue *catalogue, const scene_field *fi
         snprintf(out, size, "%s", field->name);
 }
 
-static void write_label(const scene_decorations *scene, int bar, const session_catalogue *catalogue,
-                        const scene_field *field, char *label, size_t size)
+static void write_colour_bar_label(const scene_decorations *scene, int bar, const session_catalogue *catalogue,
+                                   const scene_field *field, char *label, size_t size)
 {
     const char *unit = scene->unit_count == 1 ? scene->units[0] : bar < scene->unit_count ? scene->units[bar] : NULL;
     if (bar < scene->label_count)
         snprintf(label, size, "%s", scene->labels[bar]);
     else
-        write_name(catalogue, field, label, size);
+        write_name_of_shown_scalar(catalogue, field, label, size);
     const size_t length = strlen(label);
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
 /* Returns whether an earlier colour bar has the same field, colours and ticks. This happens if several layers show one
  * field. */
-static bool is_repeated_bar(const session_decorations *d, int bar)
+static bool is_equal_colour_bar_present(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];
     bool is_found = false;
@@ -308,8 +312,8 @@ typedef struct bar_basis {
 } bar_basis;
 
 /* Adds the colour bar of a layer, unless an equal bar has been added already. */
-static void add_bar(session_decorations *d, const bar_basis *basis, const scene_field *field,
-                    const scene_colour_map *map, const session_transfer *transfer)
+static void add_colour_bar_if_new(session_decorations *d, const bar_basis *basis, const scene_field *field,
+                                  const scene_colour_map *map, const session_transfer *transfer)
 {
     const scene_decorations *scene = basis->scene;
     const int i = d->decorations.bar_count, most = scene->tick_count;
@@ -318,10 +322,10 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                                  scene->number_form};
     const int tick_count = transfer->is_constant
                                ? session_make_constant_tick(transfer->constant, &scene->number_form, d->ticks[i])
-                           : map->is_banded ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
+                           : map->is_banded ? session_make_ticks_for_colour_bands(&scale, map->count, most, d->ticks[i])
                                             : session_make_ticks(&scale, most, d->ticks[i]);
     d->fields[i] = field;
-    write_label(scene, i, basis->catalogue, field, d->labels[i], sizeof d->labels[i]);
+    write_colour_bar_label(scene, i, basis->catalogue, field, d->labels[i], sizeof d->labels[i]);
     d->bars[i] = (insitu_colour_bar){.label = d->labels[i],
                                      .colours = map->colours,
                                      .colour_count = map->count,
@@ -331,25 +335,28 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                                      .at = (insitu_anchor)scene->bar_anchor,
                                      .tick_count = tick_count,
                                      .ticks = d->ticks[i]};
-    if (!is_repeated_bar(d, i)) d->decorations.bar_count++;
+    if (!is_equal_colour_bar_present(d, i)) d->decorations.bar_count++;
 }
 
-static void fill_bars(session_decorations *d, const scene_image *image, const session_decoration_basis *given)
+static void add_colour_bars_of_layers(session_decorations *d, const scene_image *image,
+                                      const session_decoration_basis *given)
 {
     const bar_basis basis = {&image->decorations, given->catalogue};
     const session_transfer *transfers = given->layers->transfers;
     for (int i = 0; i < image->isosurface_count; i++)
         if (image->isosurfaces[i].has_colour_by)
-            add_bar(d, &basis, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map, &transfers[i]);
+            add_colour_bar_if_new(d, &basis, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map,
+                                  &transfers[i]);
     const int outer = given->layers->first_outer, planes = outer + image->surface_count;
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by)
-            add_bar(d, &basis, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map, &transfers[outer + i]);
+            add_colour_bar_if_new(d, &basis, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map,
+                                  &transfers[outer + i]);
     for (int i = 0, plane = planes; i < image->slice_count; plane += image->slices[i++].plane_count)
-        add_bar(d, &basis, &image->slices[i].field, &image->slices[i].colour_map, &transfers[plane]);
+        add_colour_bar_if_new(d, &basis, &image->slices[i].field, &image->slices[i].colour_map, &transfers[plane]);
     for (int i = 0; i < image->volume_count; i++)
-        add_bar(d, &basis, &image->volumes[i].field, &image->volumes[i].colour_map,
-                &transfers[given->layers->surface_count + i]);
+        add_colour_bar_if_new(d, &basis, &image->volumes[i].field, &image->volumes[i].colour_map,
+                              &transfers[given->layers->surface_count + i]);
 }
 
 static void hash_colours(uint64_t *hash, const float *colours, int count)
@@ -359,7 +366,7 @@ static void hash_colours(uint64_t *hash, const float *colours, int count)
 }
 
 /* Returns a hash of the labels, colours and ticks of all colour bars. */
-static uint64_t hash_bars(const insitu_decorations *d)
+static uint64_t hash_colour_bars(const insitu_decorations *d)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < d->bar_count; i++) {
@@ -380,7 +387,7 @@ static uint64_t hash_bars(const insitu_decorations *d)
 
 /* ---- all decorations ----------------------------------------------------------------------------------------- */
 
-static void fill_axes(session_decorations *d, const render_camera *c)
+static void set_orientation_axes(session_decorations *d, const render_camera *c)
 {
     for (int a = 0; a < 3; a++) {
         d->decorations.axes[a][0] = c->right[a];
@@ -390,8 +397,8 @@ static void fill_axes(session_decorations *d, const render_camera *c)
 }
 
 /* Computes the scale bar and the rulers. */
-static void fill_length_decorations(session_decorations *d, const scene_decorations *scene,
-                                    const session_extent *extent, const render_camera *camera)
+static void add_scale_bar_and_rulers(session_decorations *d, const scene_decorations *scene,
+                                     const session_extent *extent, const render_camera *camera)
 {
     double middle[3];
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
@@ -402,7 +409,8 @@ static void fill_length_decorations(session_decorations *d, const scene_decorati
     d->decorations.scale_bar.at = (insitu_anchor)scene->scale_bar_anchor;
 }
 
-static void fill_outline(session_decorations *d, const session_outline *outline, const render_camera *camera)
+static void add_strokes_of_outline_boxes(session_decorations *d, const session_outline *outline,
+                                         const render_camera *camera)
 {
     for (int i = 0; i < outline->count; i++)
         d->decorations.stroke_count += session_compute_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper,
@@ -426,12 +434,12 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     d->background = d->decorations;
     d->background.has_axes = false;
     choose_text_colour(image, d->decorations.colour);
-    fill_axes(d, &basis->view->camera);
-    if (scene->has_bars) fill_bars(d, image, basis);
-    d->bars_hash = hash_bars(&d->decorations);
+    set_orientation_axes(d, &basis->view->camera);
+    if (scene->has_bars) add_colour_bars_of_layers(d, image, basis);
+    d->bars_hash = hash_colour_bars(&d->decorations);
     if (d->strokes) {
-        fill_outline(d, basis->outline, &basis->view->camera);
-        if (basis->extent->cell_count) fill_length_decorations(d, scene, basis->extent, &basis->view->camera);
+        add_strokes_of_outline_boxes(d, basis->outline, &basis->view->camera);
+        if (basis->extent->cell_count) add_scale_bar_and_rulers(d, scene, basis->extent, &basis->view->camera);
         if (add_scene_texts(d, scene, basis->moment)) return d;
     }
     session_free_decorations(d);

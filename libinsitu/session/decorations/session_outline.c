@@ -17,7 +17,7 @@ void session_free_outline(session_outline *outline)
 
 enum { ENDS = 6 };
 
-static void widen_bounds(const session_mesh *mesh, double ends[ENDS])
+static void extend_bounds_by_mesh(const session_mesh *mesh, double ends[ENDS])
 {
     if (!mesh->is_given || mesh->drawn_count == 0) return;
     for (int axis = 0; axis < 3; axis++) {
@@ -27,7 +27,7 @@ static void widen_bounds(const session_mesh *mesh, double ends[ENDS])
 }
 
 /* Adds each of the `count` boxes to the outline, unless it is empty. */
-static void add_boxes(const double *ends, int count, session_outline *out)
+static void append_non_empty_boxes(const double *ends, int count, session_outline *out)
 {
     for (int i = 0; i < count; i++, ends += ENDS) {
         if (!(ends[0] <= -ends[3])) continue;
@@ -41,25 +41,28 @@ static void add_boxes(const double *ends, int count, session_outline *out)
 
 /* Computes the bounding boxes of this rank's cells: one box for each mesh of the catalogue if by_mesh is set, and
  * otherwise one box for all meshes. */
-static void find_bounds(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
+static void compute_local_outline_bounds(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh,
+                                         double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;
     for (int i = 0; i < catalogue->mesh_count; i++) {
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
-        for (int n = 0; n < parts.count; n++) widen_bounds(parts.items[n], ends + (by_mesh ? i * (ptrdiff_t)ENDS : 0));
+        for (int n = 0; n < parts.count; n++)
+            extend_bounds_by_mesh(parts.items[n], ends + (by_mesh ? i * (ptrdiff_t)ENDS : 0));
     }
 }
 
-static insitu_status gather_bounds(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh,
-                                   int boxes, const session_team *team, double *all, base_error *error)
+static insitu_status collect_bounds_on_rank_0(const session_catalogue *catalogue, const session_meshes *meshes,
+                                              bool by_mesh, int boxes, const session_team *team, double *all,
+                                              base_error *error)
 {
     double own[ENDS];
     if (!by_mesh) {
-        find_bounds(catalogue, meshes, false, own);
+        compute_local_outline_bounds(catalogue, meshes, false, own);
         return session_check_mpi(error, MPI_Gather(own, ENDS, MPI_DOUBLE, all, ENDS, MPI_DOUBLE, 0, team->comm),
                                  "MPI_Gather");
     }
-    find_bounds(catalogue, meshes, true, all);
+    compute_local_outline_bounds(catalogue, meshes, true, all);
     return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, all, ENDS * boxes, MPI_DOUBLE, MPI_MIN, team->comm),
                              "MPI_Allreduce");
 }
@@ -73,16 +76,17 @@ static bool allocate_boxes(session_outline *out, int count)
     return out->boxes != NULL;
 }
 
-static insitu_status find_boxes(bool by_mesh, const session_catalogue *catalogue, const session_meshes *meshes,
-                                const session_team *team, session_outline *out, base_error *error)
+static insitu_status collect_outline_boxes(bool by_mesh, const session_catalogue *catalogue,
+                                           const session_meshes *meshes, const session_team *team, session_outline *out,
+                                           base_error *error)
 {
     const int boxes = by_mesh ? catalogue->mesh_count : team->ranks;
     double *ends = base_alloc((size_t)boxes * ENDS * sizeof *ends);
     if (!ends || (team->rank == 0 && !allocate_boxes(out, boxes)))
         session_fail_for_memory(error, boxes * (int64_t)(ENDS * sizeof *ends), "boxes of an outline");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = gather_bounds(catalogue, meshes, by_mesh, boxes, team, ends, error);
-    if (!status && team->rank == 0) add_boxes(ends, boxes, out);
+    if (!status) status = collect_bounds_on_rank_0(catalogue, meshes, by_mesh, boxes, team, ends, error);
+    if (!status && team->rank == 0) append_non_empty_boxes(ends, boxes, out);
     base_free(ends);
     if (status) session_free_outline(out);
     return status;
@@ -95,7 +99,8 @@ insitu_status session_find_outline(const scene_decorations *decorations, const s
     *out = (session_outline){0};
     if (!decorations->is_given || decorations->outline == SCENE_NO_BOX || extent->cell_count == 0) return INSITU_OK;
     if (decorations->outline != SCENE_BOX_OF_DATA)
-        return find_boxes(decorations->outline == SCENE_BOXES_OF_MESHES, catalogue, meshes, team, out, error);
+        return collect_outline_boxes(decorations->outline == SCENE_BOXES_OF_MESHES, catalogue, meshes, team, out,
+                                     error);
     if (team->rank == 0 && !allocate_boxes(out, 1))
         session_fail_for_memory(error, (int64_t)sizeof *out->boxes, "an outline");
     const insitu_status status = session_agree(team->comm, error);

@@ -10,12 +10,12 @@ typedef struct round_step {
     int factor, exponent;
 } round_step;
 
-static double round_step_size(round_step step)
+static double compute_size_of_round_step(round_step step)
 {
     return step.factor * pow(10, step.exponent);
 }
 
-static round_step next_step(round_step step)
+static round_step get_next_larger_round_step(round_step step)
 {
     if (step.factor == 5) return (round_step){1, step.exponent + 1};
     return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
@@ -23,7 +23,7 @@ static round_step next_step(round_step step)
 
 /* Computes the integers `first` and `last` such that first * step and last * step are the smallest and the largest
  * multiple of the step in [low, high]. A multiple that differs from low or high only by rounding is included. */
-static void find_multiples(double low, double high, double step, double *first, double *last)
+static void find_range_of_multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
     *first = ceil(low / step - slack);
@@ -34,10 +34,10 @@ static round_step choose_round_step(double low, double high, int most)
 {
     round_step step = {1, (int)floor(log10((high - low) / most))};
     double first, last;
-    find_multiples(low, high, round_step_size(step), &first, &last);
+    find_range_of_multiples(low, high, compute_size_of_round_step(step), &first, &last);
     while (last - first >= most) {
-        step = next_step(step);
-        find_multiples(low, high, round_step_size(step), &first, &last);
+        step = get_next_larger_round_step(step);
+        find_range_of_multiples(low, high, compute_size_of_round_step(step), &first, &last);
     }
     return step;
 }
@@ -99,9 +99,9 @@ static int fill_ticks_at_multiples(const session_scale *s, int most, insitu_tick
     const int digits = is_plain ? -step.exponent : (int)floor(log10(largest)) - step.exponent;
     double first, last;
     int count = 0;
-    find_multiples(s->low, s->high, round_step_size(step), &first, &last);
+    find_range_of_multiples(s->low, s->high, compute_size_of_round_step(step), &first, &last);
     for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
-        const double value = n * round_step_size(step);
+        const double value = n * compute_size_of_round_step(step);
         ticks[count].place = compute_position_on_scale(s, value);
         write_number_in_form(value, &s->number_form, is_plain, digits, &ticks[count]);
         count++;
@@ -118,7 +118,7 @@ typedef struct decade_choice {
     int step;
 } decade_choice;
 
-static void add_tick(const session_scale *s, double value, insitu_tick *ticks, int *count)
+static void add_tick_if_in_range(const session_scale *s, double value, insitu_tick *ticks, int *count)
 {
     const double size = fabs(value), slack = 1e-9 * size;
     if (value < s->low - slack || value > s->high + slack) return;
@@ -136,7 +136,8 @@ static void add_tick(const session_scale *s, double value, insitu_tick *ticks, i
 
 /* Adds ticks at the powers of ten in the range, multiplied by `sign`, and at 2 and 5 times these powers if the choice
  * includes them. */
-static void add_decades(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks, int *count)
+static void add_ticks_at_powers_of_ten(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks,
+                                       int *count)
 {
     const double largest = fmax(fabs(s->low), fabs(s->high));
     const double smallest = s->kind == RENDER_SYMLOG ? s->threshold : s->low;
@@ -144,38 +145,38 @@ static void add_decades(const session_scale *s, double sign, decade_choice choic
     for (int n = first; n <= last; n++) {
         if (n % choice.step) continue;
         const double power = pow(10, n);
-        if (power >= smallest * (1 - 1e-9)) add_tick(s, sign * power, ticks, count);
-        if (choice.has_2_and_5 && 2 * power >= smallest) add_tick(s, sign * 2 * power, ticks, count);
-        if (choice.has_2_and_5 && 5 * power >= smallest) add_tick(s, sign * 5 * power, ticks, count);
+        if (power >= smallest * (1 - 1e-9)) add_tick_if_in_range(s, sign * power, ticks, count);
+        if (choice.has_2_and_5 && 2 * power >= smallest) add_tick_if_in_range(s, sign * 2 * power, ticks, count);
+        if (choice.has_2_and_5 && 5 * power >= smallest) add_tick_if_in_range(s, sign * 5 * power, ticks, count);
     }
 }
 
-static int fill_decade_ticks(const session_scale *s, decade_choice choice, insitu_tick *ticks)
+static int make_logarithmic_ticks(const session_scale *s, decade_choice choice, insitu_tick *ticks)
 {
     int count = 0;
     if (s->kind == RENDER_SYMLOG) {
-        add_decades(s, -1, choice, ticks, &count);
-        add_tick(s, 0, ticks, &count);
+        add_ticks_at_powers_of_ten(s, -1, choice, ticks, &count);
+        add_tick_if_in_range(s, 0, ticks, &count);
     }
-    add_decades(s, 1, choice, ticks, &count);
+    add_ticks_at_powers_of_ten(s, 1, choice, ticks, &count);
     return count;
 }
 
 /* ---- ticks on any scale ---------------------------------------------------------------------------------------- */
 
-static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
+static int make_ticks_for_scale(const session_scale *s, int most, insitu_tick *ticks)
 {
     if (s->kind == RENDER_LINEAR) return fill_ticks_at_multiples(s, most, ticks);
-    int count = fill_decade_ticks(s, (decade_choice){true, 1}, ticks);
+    int count = make_logarithmic_ticks(s, (decade_choice){true, 1}, ticks);
     for (int every = 1; count > most && every <= 64; every++)
-        count = fill_decade_ticks(s, (decade_choice){false, every}, ticks);
+        count = make_logarithmic_ticks(s, (decade_choice){false, every}, ticks);
     return count < 2 ? fill_ticks_at_multiples(s, most, ticks) : count;
 }
 
 /* Adds a tick in the centre of each band (one of `bands` intervals of equal width), or of every n-th band if there are
  * many. Does this only if each band corresponds to one integer: the range begins and ends at integers, or half a band
  * beyond them. Returns the number of ticks; 0 if the bands do not correspond to integers. */
-static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
+static int add_ticks_at_integer_bands(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;
     const int every = (bands + SESSION_MAX_TICKS - 1) / SESSION_MAX_TICKS;
@@ -190,9 +191,10 @@ static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ti
     return count;
 }
 
-int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS])
+int session_make_ticks_for_colour_bands(const session_scale *scale, int bands, int most,
+                                        insitu_tick ticks[SESSION_MAX_TICKS])
 {
-    const int count = fill_integer_ticks(scale, bands, ticks);
+    const int count = add_ticks_at_integer_bands(scale, bands, ticks);
     return count ? count : session_make_ticks(scale, most, ticks);
 }
 
@@ -200,7 +202,7 @@ int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[S
 {
     c_locale numbers;
     const bool is_begun = c_locale_enter(&numbers);
-    const int count = fill_ticks(scale, most, ticks);
+    const int count = make_ticks_for_scale(scale, most, ticks);
     if (is_begun) c_locale_leave(&numbers);
     return count;
 }

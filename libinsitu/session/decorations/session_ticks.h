@@ -26,7 +26,8 @@ int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[S
 /* Computes ticks like session_make_ticks() for a range that is divided into `bands` bands of equal width, each with one
  * colour. If the scale is linear and each band contains one integer, such as an id, the ticks are instead in the
  * centres of the bands, or of every n-th band. Local. */
-int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
+int session_make_ticks_for_colour_bands(const session_scale *scale, int bands, int most,
+                                        insitu_tick ticks[SESSION_MAX_TICKS]);
 
 /* Computes the single tick, in the middle of the scale, of data whose values are all equal. Returns 1. Local. */
 int session_make_constant_tick(double value, const scene_number_form *form, insitu_tick *tick);

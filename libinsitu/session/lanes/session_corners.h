@@ -25,7 +25,7 @@ typedef struct cell_corners {
  * for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
-static inline __attribute__((always_inline)) cell_corners find_cell_corners(int type)
+static inline __attribute__((always_inline)) cell_corners get_corners_of_cell_type(int type)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}};
     static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},

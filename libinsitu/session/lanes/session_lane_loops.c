@@ -53,7 +53,7 @@ typedef struct lane_sizes {
     words inverted_counts; /* negated number of cells with a negative volume */
 } lane_sizes;
 
-LANE_INLINE lane_bounds bounds_empty(void)
+LANE_INLINE lane_bounds make_empty_bounds(void)
 {
     lane_bounds b;
     for (int axis = 0; axis < 3; axis++) {
@@ -65,15 +65,15 @@ LANE_INLINE lane_bounds bounds_empty(void)
     return b;
 }
 
-LANE_INLINE lane_sizes sizes_empty(void)
+LANE_INLINE lane_sizes make_zero_size_sums(void)
 {
     lane_sizes s = {.least = doubles_set((double)INFINITY)};
     for (int part = 0; part < PARTS; part++) s.sums[part] = doubles_set(0);
     return s;
 }
 
-LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type, const bool wide_index,
-                                         const bool wide_number)
+LANE_INLINE lane_source describe_input_arrays(const lane_cells *cells, const int type, const bool wide_index,
+                                              const bool wide_number)
 {
     const grid *g = cells->g;
     lane_source s = {.connectivity = g->connectivity.data + cells->first_entry * g->connectivity.stride,
@@ -149,7 +149,7 @@ LANE_INLINE bool are_valid_indices(const lane_source *s, const char *indices)
                                                     s->least_index, s->greatest_index);
 }
 
-LANE_INLINE bool has_ghost(const lane_source *s, int64_t cell)
+LANE_INLINE bool has_ghost_in_lanes(const lane_source *s, int64_t cell)
 {
     char any = 0;
     for (int lane = 0; lane < LANES; lane++)
@@ -194,7 +194,7 @@ LANE_INLINE void gather_points(const lane_source *s, const char *indices, int fi
     }
 }
 
-LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, int vertex, int axis)
+LANE_INLINE doubles get_coordinates_as_doubles(const lane_source *s, const lane_points *points, int vertex, int axis)
 {
     return s->wide_number ? points->wide[vertex][axis] : doubles_from_floats(points->narrow[vertex][axis]);
 }
@@ -202,7 +202,7 @@ LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, 
 /* Returns, per lane, the cell's volume multiplied by cell_corners.volume_factor, as a sum over its corners. */
 LANE_INLINE doubles sum_corner_volumes(const lane_source *s, const lane_points *points)
 {
-    const cell_corners of = find_cell_corners(s->type);
+    const cell_corners of = get_corners_of_cell_type(s->type);
     doubles sum = doubles_set(0);
 #pragma GCC unroll 8
     for (int i = 0; i < of.count; i++) {
@@ -210,7 +210,8 @@ LANE_INLINE doubles sum_corner_volumes(const lane_source *s, const lane_points *
         doubles edge[3][3];
         for (int k = 0; k < 3; k++)
             for (int axis = 0; axis < 3; axis++)
-                edge[k][axis] = coordinate(s, points, corner[k + 1], axis) - coordinate(s, points, corner[0], axis);
+                edge[k][axis] = get_coordinates_as_doubles(s, points, corner[k + 1], axis) -
+                                get_coordinates_as_doubles(s, points, corner[0], axis);
         const doubles *u = edge[0], *v = edge[1], *w = edge[2];
         sum += u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
                u[2] * (v[0] * w[1] - v[1] * w[0]);
@@ -218,7 +219,7 @@ LANE_INLINE doubles sum_corner_volumes(const lane_source *s, const lane_points *
     return sum;
 }
 
-LANE_INLINE void widen_bounds(const lane_source *s, const lane_points *points, lane_bounds *b)
+LANE_INLINE void extend_bounds_by_vertices(const lane_source *s, const lane_points *points, lane_bounds *b)
 {
     for (int i = 0; i < s->count; i++)
         for (int axis = 0; axis < 3; axis++) {
@@ -235,21 +236,21 @@ LANE_INLINE void widen_bounds(const lane_source *s, const lane_points *points, l
 /* Computes the volumes (times cell_corners.volume_factor) and the bounds of cells [begin, end), LANES at a time. Stops
  * before a group of LANES cells that contains a ghost or an invalid index, or if fewer than LANES cells are left.
  * Returns the cell at which it stopped. */
-LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds,
-                                    double *volumes)
+LANE_INLINE int64_t compute_cell_volumes_and_bounds(const lane_source *s, int64_t begin, int64_t end,
+                                                    lane_bounds *bounds, double *volumes)
 {
     lane_bounds b = *bounds;
     int64_t cell = begin;
     for (; cell + LANES <= end; cell += LANES) {
         int64_t buffer[LANES * GRID_MAX_CELL_VERTICES];
         const char *const indices = load_indices(s, cell, buffer);
-        if (!are_valid_indices(s, indices) || (s->ghosts && has_ghost(s, cell))) break;
+        if (!are_valid_indices(s, indices) || (s->ghosts && has_ghost_in_lanes(s, cell))) break;
 #pragma GCC unroll 2
         for (int part = 0; part < PARTS; part++) {
             lane_points points;
             gather_points(s, indices, part * LANE_WIDTH, &points);
             doubles_store(volumes, sum_corner_volumes(s, &points));
-            widen_bounds(s, &points, &b);
+            extend_bounds_by_vertices(s, &points, &b);
             volumes += LANE_WIDTH;
         }
     }
@@ -259,7 +260,7 @@ LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t
 
 /* ---- sizes of cells (cube roots of volumes) ------------------------------------------------------------------ */
 
-LANE_INLINE doubles cube_root(doubles x)
+LANE_INLINE doubles compute_cube_roots(doubles x)
 {
     doubles y = (doubles)((((((bits)x >> 32) * CUBE_ROOT_THIRD) >> 32) + CUBE_ROOT_OFFSET) << 32);
     for (int step = 0; step < CUBE_ROOT_STEPS; step++) {
@@ -271,7 +272,7 @@ LANE_INLINE doubles cube_root(doubles x)
 
 /* Computes the sizes of cells from `count` volumes, and adds them to the sums; count must be a multiple of LANES. If a
  * volume is 0, too small, too large or NaN, returns false and leaves the sums unchanged. */
-LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *sizes)
+LANE_INLINE bool add_cell_sizes_to_sums(const double *volumes, int64_t count, lane_sizes *sizes)
 {
     lane_sizes s = *sizes;
     words unusual = {0};
@@ -282,7 +283,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
             unusual |= ~((words)(size > 1e-280) & (words)(size < 1e280));
             s.least = doubles_min(size, s.least);
             s.inverted_counts += (words)(volume < 0); /* the comparison results in -1 if the volume is negative */
-            s.sums[part] += cube_root(size);
+            s.sums[part] += compute_cube_roots(size);
         }
     }
     if (words_any(unusual)) return false;
@@ -292,7 +293,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
 
 /* ---- loops over all cells of one type ------------------------------------------------------------------------ */
 
-LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
+LANE_INLINE void reduce_bounds_over_lanes(const lane_bounds *b, lane_sums *out)
 {
     for (int axis = 0; axis < 3; axis++) {
         const doubles lower = doubles_min(doubles_from_floats(b->narrow_lower[axis]), b->lower[axis]);
@@ -306,7 +307,8 @@ LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
     }
 }
 
-LANE_INLINE void store_sizes(const lane_sizes *s, double volume_factor, double root_of_factor, lane_sums *out)
+LANE_INLINE void reduce_cell_sizes_over_lanes(const lane_sizes *s, double volume_factor, double root_of_factor,
+                                              lane_sums *out)
 {
     double sum = 0, least = (double)INFINITY;
     out->inverted_count = 0;
@@ -320,36 +322,37 @@ LANE_INLINE void store_sizes(const lane_sizes *s, double volume_factor, double r
     out->size_sum = sum / root_of_factor;
 }
 
-LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count, const int type,
-                              const bool wide_index, const bool wide_number)
+LANE_INLINE int64_t compute_bounds_and_size_sums(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count,
+                                                 const int type, const bool wide_index, const bool wide_number)
 {
     _Alignas(64) double volumes[BLOCK_CELLS];
-    const lane_source s = make_lane_source(cells, type, wide_index, wide_number);
-    const double volume_factor = find_cell_corners(type).volume_factor;
-    lane_bounds bounds = bounds_empty();
-    lane_sizes sizes = sizes_empty();
+    const lane_source s = describe_input_arrays(cells, type, wide_index, wide_number);
+    const double volume_factor = get_corners_of_cell_type(type).volume_factor;
+    lane_bounds bounds = make_empty_bounds();
+    lane_sizes sizes = make_zero_size_sums();
     int64_t cell = 0;
     *scalar_count = 0;
     while (cell < cells->count && !*scalar_count) {
         const int64_t end = cell + BLOCK_CELLS < cells->count ? cell + BLOCK_CELLS : cells->count;
-        const int64_t next = compute_volumes(&s, cell, end, &bounds, volumes);
-        if (!add_sizes(volumes, next - cell, &sizes)) {
-            for (const double *good = volumes; add_sizes(good, LANES, &sizes); good += LANES) cell += LANES;
+        const int64_t next = compute_cell_volumes_and_bounds(&s, cell, end, &bounds, volumes);
+        if (!add_cell_sizes_to_sums(volumes, next - cell, &sizes)) {
+            for (const double *good = volumes; add_cell_sizes_to_sums(good, LANES, &sizes); good += LANES)
+                cell += LANES;
             *scalar_count = LANES;
             break;
         }
         cell = next;
         if (cell < end) *scalar_count = end - cell < LANES ? end - cell : LANES;
     }
-    store_bounds(&bounds, sums);
-    store_sizes(&sizes, volume_factor, cbrt(volume_factor), sums);
+    reduce_bounds_over_lanes(&bounds, sums);
+    reduce_cell_sizes_over_lanes(&sizes, volume_factor, cbrt(volume_factor), sums);
     return cell;
 }
 
 #define DEFINE_RUN(name, type, wide_index, wide_number)                                                                \
     static int64_t name(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count)                               \
     {                                                                                                                  \
-        return sum_cells(cells, sums, scalar_count, type, wide_index, wide_number);                                    \
+        return compute_bounds_and_size_sums(cells, sums, scalar_count, type, wide_index, wide_number);                 \
     }
 
 #define DEFINE_RUNS(name, type)                                                                                        \

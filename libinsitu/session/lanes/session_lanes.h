@@ -36,7 +36,7 @@ typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *scal
 
 /* Returns the function for cells of this type, and for the element sizes of the grid's arrays of indices and
  * coordinates; NULL if there is none for the type. */
-lane_run *session_find_lane_run(cpu_isa isa, const grid *g, int type);
+lane_run *session_get_cell_loop_for_type(cpu_isa isa, const grid *g, int type);
 
 /* ---- tables of functions, for session_lanes.c ---------------------------------------------------------------- */
 

@@ -43,7 +43,7 @@ MMBVH_INLINE double corner_volume(double points[][3], const signed char corner[4
 
 MMBVH_INLINE double signed_volume(int type, double points[][3])
 {
-    const cell_corners of = find_cell_corners(type);
+    const cell_corners of = get_corners_of_cell_type(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += corner_volume(points, of.corners[i]);
     return sum / of.volume_factor;
@@ -87,7 +87,7 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
  * a cell that intersects itself may sum to 0 although the cell is not flat. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
-    const cell_corners of = find_cell_corners(type);
+    const cell_corners of = get_corners_of_cell_type(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += fabs(corner_volume(points, of.corners[i]));
     return is_flat_volume(sum / of.volume_factor, box_volume(points, grid_type_vertex_count(type)));
@@ -194,7 +194,7 @@ static void compute_quad_corner_areas(double points[][3], double out[4])
 bool tally_has_corners_of_both_signs(int type, double points[][3])
 {
     const bool is_quad = type == GRID_QUAD;
-    const cell_corners of = find_cell_corners(is_quad ? GRID_TET : type);
+    const cell_corners of = get_corners_of_cell_type(is_quad ? GRID_TET : type);
     double volumes[8], largest = 0;
     const int count = is_quad ? 4 : of.count;
     if (is_quad) compute_quad_corner_areas(points, volumes);
@@ -327,7 +327,7 @@ static int64_t tally_cells_in_lanes(const lane_cells *alike, mesh_tally *t, doub
     *alone = alike->count;
     /* a sequence whose grid has a lattice consists of a single cell (find_row_run()) */
     if (alike->count < LANES || alike->g->lattice) return 0;
-    lane_run *const run = session_find_lane_run(cpu_best_isa(), alike->g, alike->type);
+    lane_run *const run = session_get_cell_loop_for_type(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
     const int64_t taken = run(alike, &sums, alone);

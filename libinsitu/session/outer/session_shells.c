@@ -43,7 +43,7 @@ scene_surface session_make_shell_layer(const scene_isosurface *layer, int height
                               .field = layer->field,
                               .has_values = true,
                               .is_alone = true,
-                              .width = scene_default_line_width(height)};
+                              .width = scene_get_default_line_width(height)};
     copy_isovalues(layer, &out.lines);
     return out;
 }

@@ -569,7 +569,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
         has_lines = has_lines || scene_draws_text(plan->images[i]);
         /* a copy of the image, in which the camera is that of this step; the copy's lists belong to the scene */
         scene_image placed = *plan->images[i];
-        placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
+        placed.camera = scene_compute_camera_at_time(&placed.camera, d->cycle, d->report->public_report.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {
             *drawn |= (uint64_t)1 << placed.variant.source;
             session_record_written_files(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,

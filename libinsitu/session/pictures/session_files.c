@@ -28,7 +28,7 @@ static insitu_image_format find_image_format(const scene_output *output)
 static void write_output(session_files *files, const scene_output *output)
 {
     const session_decorations *decorations = files->decorations;
-    char *path = scene_expand(output->path, &files->moment);
+    char *path = scene_expand_placeholders(output->path, &files->moment);
     if (!path) {
         base_fail(&files->error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
         return;

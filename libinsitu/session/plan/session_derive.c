@@ -335,7 +335,7 @@ static void evaluate_expression_in_blocks(const scene_derived *derived, const gr
             const int size = count - first < SCENE_BLOCK ? (int)(count - first) : SCENE_BLOCK;
             for (int k = 0; k < derived->input_count; k++)
                 load_block(&inputs[k], first, size, buffer->values + k * SCENE_BLOCK);
-            scene_evaluate(&derived->expression, buffer->inputs, size, stack);
+            scene_evaluate_expression(&derived->expression, buffer->inputs, size, stack);
             for (int i = 0; i < size; i++) store_tuple(field, first + i, stack + i);
         }
         region_leave();

@@ -34,7 +34,7 @@ static uint64_t find_derived_fields_of_image(const scene *scene, const scene_ima
 {
     scene_field_walk walk = {.image = image};
     uint64_t bits = 0;
-    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;)
+    for (const scene_field *field; (field = scene_find_next_field_of_layers(&walk)) != NULL;)
         bits |= find_derived_field_bit(scene, field);
     return bits;
 }

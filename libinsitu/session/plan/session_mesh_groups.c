@@ -119,7 +119,7 @@ static bool group_meshes_of_image(session_catalogue *catalogue, const scene_imag
 {
     scene_field_walk walk = {.image = image};
     bool is_done = true;
-    for (scene_field *field; is_done && (field = scene_next_field(&walk)) != NULL;)
+    for (scene_field *field; is_done && (field = scene_find_next_field_of_layers(&walk)) != NULL;)
         is_done = walk.role == SCENE_THRESHOLD || group_meshes_of_field(catalogue, field);
     return is_done;
 }

@@ -80,7 +80,7 @@ static void write_suggestion(const session_catalogue *catalogue, const char *nam
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int f = 0; f < catalogue->meshes[m].field_count && count < 256; f++)
             candidates[count++] = catalogue->meshes[m].fields[f].name;
-    const char *meant = scene_nearest_word(name, candidates, count);
+    const char *meant = scene_find_most_similar_word(name, candidates, count);
     words[0] = '\0';
     if (meant) snprintf(words, 300, " (did you mean %.255s?)", meant);
 }
@@ -290,7 +290,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
         /* views of an orbit share the layers of their first view, so that only the first view is checked */
         if (plan->images[i]->variant.view > 0) continue;
         scene_field_walk walk = {.image = plan->images[i]};
-        for (const scene_field *field; is_planned && (field = scene_next_field(&walk)) != NULL;)
+        for (const scene_field *field; is_planned && (field = scene_find_next_field_of_layers(&walk)) != NULL;)
             is_planned = walk.role == SCENE_THRESHOLD || add_recentrings(catalogue, plan, field);
     }
     plan->stale = base_calloc((size_t)plan->recentring_count + 1, sizeof *plan->stale);
@@ -426,7 +426,7 @@ static void warn_of_shells_and_ungrouped_meshes(const session_catalogue *catalog
                                                 session_report *report)
 {
     scene_field_walk walk = {.image = image};
-    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
+    for (const scene_field *field; (field = scene_find_next_field_of_layers(&walk)) != NULL;) {
         const char *layer = scene_get_layer_word(walk.kind);
         if (walk.role == SCENE_SHOWN && walk.kind != SCENE_ISOSURFACE)
             warn_of_shells(catalogue, image, layer, field, report);

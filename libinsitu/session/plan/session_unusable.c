@@ -16,7 +16,7 @@ typedef struct field_walk {
 static const scene_field *next_shown_field(field_walk *walk)
 {
     for (;;) {
-        const scene_field *field = walk->fields.image ? scene_next_field(&walk->fields) : NULL;
+        const scene_field *field = walk->fields.image ? scene_find_next_field_of_layers(&walk->fields) : NULL;
         if (field && walk->fields.role == SCENE_SHOWN && walk->fields.kind != SCENE_SLICE) return field;
         if (field) continue;
         if (walk->image == walk->plan->image_count) return NULL;

@@ -23,7 +23,7 @@ static bool is_corner_field_used_by_image(const session_mesh *mesh, const scene_
 {
     scene_field_walk walk = {.image = image};
     bool is_in = image->condition.is_given && is_field_at_corners(mesh, &image->condition.field);
-    for (const scene_field *field; !is_in && (field = scene_next_field(&walk)) != NULL;)
+    for (const scene_field *field; !is_in && (field = scene_find_next_field_of_layers(&walk)) != NULL;)
         is_in = is_field_at_corners(mesh, field);
     return is_in;
 }

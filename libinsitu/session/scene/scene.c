@@ -15,8 +15,8 @@
 
 /* ---- images ---- */
 
-static insitu_status convert_name(const scene_document *d, const char *path, const scene *s, const char *name,
-                                  scene_image *out)
+static insitu_status check_and_copy_image_name(const scene_document *d, const char *path, const scene *s,
+                                               const char *name, scene_image *out)
 {
     if (strchr(name, '/')) return scene_fail_at_key(d, path, "name", "\"%s\" holds a /, expected a name without", name);
     for (const scene_image *other = s->images; other < out; other++) {
@@ -48,7 +48,7 @@ static bool is_sampling_unspecified(const scene_file_sampling *in)
 /* Chooses the default method for volumes. A single volume is integrated over the segments of each ray, with an error
  * bound: samples would be cheaper, but their noise has no known bound. Several volumes are sampled, because otherwise
  * the segments of different volumes would have to be blended at each pixel. */
-static void choose_method_of_volumes(const scene_file_sampling *in, scene_image *out)
+static void choose_volume_sampling_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
     const bool by_default = is_sampling_unspecified(in) && out->volume_count == 1;
@@ -62,7 +62,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
 {
     static const scene_file_sampling none;
     if (!in) in = &none;
-    choose_method_of_volumes(in, out);
+    choose_volume_sampling_method(in, out);
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : SCENE_STEP_CELLS;
     out->jitter = in->jitter ? *in->jitter : true;
@@ -78,8 +78,8 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     return INSITU_OK;
 }
 
-static insitu_status convert_antialias(const scene_document *d, const char *path, const int *antialias,
-                                       scene_image *out)
+static insitu_status convert_sample_count_per_pixel(const scene_document *d, const char *path, const int *antialias,
+                                                    scene_image *out)
 {
     const int count = antialias ? *antialias : 1;
     if (count & (count - 1)) return scene_fail_at_key(d, path, "antialias", "is %d, expected 1, 2, 4, 8 or 16", count);
@@ -94,13 +94,13 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     char camera_path[SCENE_PATH_SIZE], clip_path[SCENE_PATH_SIZE];
     snprintf(camera_path, sizeof camera_path, "%s.camera", path);
     snprintf(clip_path, sizeof clip_path, "%s.clip", path);
-    out->line = scene_document_line(d, path);
+    out->line = scene_get_line_number_at_path(d, path);
     out->width = in->size ? in->size[0] : 1280;
     out->height = in->size ? in->size[1] : 720;
     out->cycle_interval = in->every ? *in->every : 1;
     out->time_interval = in->every_time ? *in->every_time : 0;
     convert_background(in, out->background);
-    insitu_status status = convert_name(d, path, s, in->name, out);
+    insitu_status status = check_and_copy_image_name(d, path, s, in->name, out);
     if (status == INSITU_OK && in->every && in->every_time)
         status = scene_fail_at_key(d, path, "every_time", "given beside every, expected one of the two");
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
@@ -112,7 +112,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     out->is_drawn_once = in->once && *in->once;
     if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->condition);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
-    if (status == INSITU_OK) status = convert_antialias(d, path, in->antialias, out);
+    if (status == INSITU_OK) status = convert_sample_count_per_pixel(d, path, in->antialias, out);
     char decorations_path[SCENE_PATH_SIZE];
     snprintf(decorations_path, sizeof decorations_path, "%s.decorations", path);
     if (status == INSITU_OK)
@@ -123,7 +123,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
 
 /* Converts an image once for each combination of a field, an isovalue and a plane of its sweep. Of the views of an
  * orbit, only the first is converted. */
-static insitu_status convert_layer_variants(const scene_document *d, const scene_file *in, int source, scene *out)
+static insitu_status convert_variants_of_image(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
     scene_series series;
@@ -166,14 +166,14 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
     if (status) return status;
     out->images = base_calloc((size_t)count, sizeof *out->images);
     if (!out->images) return scene_fail_for_memory(d);
-    for (int i = 0; i < in->images_count && !status; i++) status = convert_layer_variants(d, in, i, out);
-    if (!status) status = scene_find_databases(d, out);
-    if (!status) status = scene_find_montages(d, out);
+    for (int i = 0; i < in->images_count && !status; i++) status = convert_variants_of_image(d, in, i, out);
+    if (!status) status = scene_assign_outputs_to_databases(d, out);
+    if (!status) status = scene_assign_outputs_to_montages(d, out);
     if (!status) add_orbit_views(out, count);
     return status;
 }
 
-static insitu_status convert_pieces(const scene_document *d, const scene_file *in, scene *out)
+static insitu_status convert_higher_order_settings(const scene_document *d, const scene_file *in, scene *out)
 {
     out->finer_pieces = in->finer_pieces ? *in->finer_pieces : 0;
     out->surface_error = in->surface_error ? *in->surface_error : SCENE_SURFACE_ERROR;
@@ -184,19 +184,19 @@ static insitu_status convert_pieces(const scene_document *d, const scene_file *i
     return INSITU_OK;
 }
 
-static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
+static insitu_status convert_scene_file(const scene_document *d, const scene_file *in, scene *out)
 {
     out->threads = in->threads ? *in->threads : 0;
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
     out->schedule = in->schedule ? (scene_schedule)*in->schedule : SCENE_SCHEDULE_AUTO;
     out->writing = in->writing ? (scene_writing)*in->writing : SCENE_WRITE_BEHIND;
-    insitu_status status = convert_pieces(d, in, out);
+    insitu_status status = convert_higher_order_settings(d, in, out);
     if (status == INSITU_OK) status = scene_convert_derived(d, in, out);
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     if (status == INSITU_OK) status = scene_convert_parameters(d, out);
     if (status == INSITU_OK) status = scene_convert_mesh_transforms(d, in, out);
-    return status == INSITU_OK ? scene_check_outputs(d, out) : status;
+    return status == INSITU_OK ? scene_check_output_paths_differ(d, out) : status;
 }
 
 /* ---- meshes ---- */
@@ -216,7 +216,7 @@ bool scene_field_selects_mesh(const scene_field *field, const char *mesh)
 
 /* Returns whether the entry with this name should be used for the mesh instead of the best entry so far, whose name is
  * `found`. This is the case if `name` selects the mesh and is longer than `found`, or if found is NULL. */
-static bool is_better_match(const char *name, const char *found, const char *mesh)
+static bool is_longer_matching_name(const char *name, const char *found, const char *mesh)
 {
     return scene_name_selects_mesh(name, mesh) && (!found || strlen(name) > strlen(found));
 }
@@ -226,7 +226,7 @@ const scene_warp *scene_find_warp(const scene *s, const char *mesh)
     const scene_warp *found = NULL;
     for (int i = 0; i < s->warp_count; i++) {
         const scene_warp *warp = &s->warps[i];
-        if (is_better_match(warp->mesh, found ? found->mesh : NULL, mesh)) found = warp;
+        if (is_longer_matching_name(warp->mesh, found ? found->mesh : NULL, mesh)) found = warp;
     }
     return found;
 }
@@ -236,7 +236,7 @@ const scene_mirror *scene_find_mirror(const scene *s, const char *mesh)
     const scene_mirror *found = NULL;
     for (int i = 0; i < s->mirror_count; i++) {
         const scene_mirror *mirror = &s->mirrors[i];
-        if (is_better_match(mirror->mesh, found ? found->mesh : NULL, mesh)) found = mirror;
+        if (is_longer_matching_name(mirror->mesh, found ? found->mesh : NULL, mesh)) found = mirror;
     }
     return found;
 }
@@ -251,8 +251,8 @@ static insitu_status parse_in_c_locale(const char *text, size_t size, const char
     insitu_status status = scene_document_open(&document, text, size, file_name, error);
     if (status != INSITU_OK) return status;
     document.attachments = attachments;
-    status = scene_document_read(&document, &file);
-    if (status == INSITU_OK) status = convert_file(&document, file, out);
+    status = scene_convert_document_to_structs(&document, &file);
+    if (status == INSITU_OK) status = convert_scene_file(&document, file, out);
     scene_document_close(&document);
     return status;
 }
@@ -346,7 +346,7 @@ void scene_free(scene *s)
     scene_free_derived(s);
     for (int i = 0; i < s->parameter_count; i++) base_free(s->parameters[i].name);
     base_free(s->parameters);
-    scene_free_meshes(s);
+    scene_free_mesh_transforms(s);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
     for (int i = 0; i < s->montage_count; i++) base_free(s->montages[i].name);

@@ -169,7 +169,7 @@ typedef struct scene_lines {
 } scene_lines;
 
 /* Returns the default width of contour lines, in pixels, in a picture of this height. */
-float scene_default_line_width(int height);
+float scene_get_default_line_width(int height);
 
 /* How an isosurface's normals are computed: from the gradient in the crossed cell, from central differences between
  * samples of the field, or by interpolation between gradients at the cell's vertices. */
@@ -336,7 +336,7 @@ typedef struct scene_camera {
 } scene_camera;
 
 /* Returns the camera of a step. The position of a moving camera is interpolated between its points. */
-scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time);
+scene_camera scene_compute_camera_at_time(const scene_camera *camera, int64_t cycle, double time);
 
 /* Anchors in the picture; the values are those of insitu_anchor (image_output.h). */
 typedef enum scene_anchor {
@@ -400,7 +400,7 @@ typedef struct scene_decorations {
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    /* path of the file, with placeholders (scene_expand()), relative to rank 0's working directory */
+    /* path of the file, with placeholders (scene_expand_placeholders()), relative to rank 0's working directory */
     char *path;
     /* format, chosen by the file name's ending; the key `bits: 16` selects SCENE_PNG16. EXR files contain float colours
      * and depth. */
@@ -564,13 +564,13 @@ typedef enum scene_field_role {
  * fields of each layer in the order of scene_field_role. */
 typedef struct scene_field_walk {
     const scene_image *image;
-    int position; /* position of the next field; used only by scene_next_field() */
+    int position; /* position of the next field; used only by scene_find_next_field_of_layers() */
     scene_layer_kind kind;
     scene_field_role role; /* role of the most recently returned field */
 } scene_field_walk;
 
 /* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
-scene_field *scene_next_field(scene_field_walk *walk);
+scene_field *scene_find_next_field_of_layers(scene_field_walk *walk);
 /* Returns the word for a kind of layer, such as "isosurface", for messages. */
 const char *scene_get_layer_word(scene_layer_kind kind);
 
@@ -684,7 +684,7 @@ void scene_free(scene *s);
 const scene_parameter *scene_find_parameter(const scene *s, const char *name);
 /* Writes the end of a message about an unknown parameter: the name that was probably meant, and the names of all
  * parameters. */
-void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
+void scene_describe_parameter_names(const scene *s, const char *name, char *words, size_t size);
 
 /* Returns the index of the field among the scene's derived fields; -1 if it is not derived. */
 int scene_find_derived(const scene *s, const char *name);
@@ -712,6 +712,6 @@ scene_placeholder_values scene_make_placeholder_values(const scene_image *image,
  * such as {cycle:0N}, and {time} and {isovalue} a format such as {time:.Nf} (or e or g instead of f). {name} and
  * {field} have no format. Numbers have a decimal point in any locale. The result is allocated by base_alloc(); NULL if
  * memory ran out. */
-char *scene_expand(const char *pattern, const scene_placeholder_values *moment);
+char *scene_expand_placeholders(const char *pattern, const scene_placeholder_values *moment);
 
 #endif

@@ -18,9 +18,9 @@ typedef struct scene_colour_points {
 } scene_colour_points;
 
 /* Scales v to unit length; returns false for a zero vector. */
-bool scene_normalize(double v[3]);
+bool scene_normalize_vector(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
-bool scene_is_parallel(const double a[3], const double b[3]);
+bool scene_are_vectors_parallel(const double a[3], const double b[3]);
 
 /* Numbers of fields, isovalues, planes and views over which an image varies. It makes one picture for each combination,
  * so that the product is the number of its pictures in a step. */
@@ -45,7 +45,7 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
                                  scene_camera *out);
-int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
+int scene_count_orbit_views(const scene_document *d, const char *path, const scene_file_camera *in);
 /* Sets the direction of a camera with an orbit to the direction of the view with this index. */
 void scene_set_orbit_view(scene_camera *camera, int view);
 
@@ -54,10 +54,10 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
                                    const scene_image *image, scene_output *out);
 /* Lists the files with several pictures (scene_montage) of all images, and assigns indices to the pictures in them.
  * Must be called before the further views of orbits are added to the scene. */
-insitu_status scene_find_montages(const scene_document *d, scene *s);
+insitu_status scene_assign_outputs_to_montages(const scene_document *d, scene *s);
 /* Lists the Cinema databases of all images. Must be called before the further views of orbits are added to the scene.
  */
-insitu_status scene_find_databases(const scene_document *d, scene *s);
+insitu_status scene_assign_outputs_to_databases(const scene_document *d, scene *s);
 
 /* The functions below convert one part of an image each. path: path of this part in the file, for messages. */
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -94,7 +94,7 @@ insitu_status scene_read_colour_file(const scene_attachment *file, const char *f
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
 /* Converts the list of mesh names of a layer. layer: path of the layer in the file. */
-insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
+insitu_status scene_convert_mesh_names(const scene_document *d, const char *layer, scene_field *out);
 
 /* Converts the text that selects a component: magnitude, x, y, z or a number; NULL means SCENE_COMPONENT_DEFAULT. path:
  * path of the mapping with the key `component`. */
@@ -148,9 +148,9 @@ insitu_status scene_convert_parameters(const scene_document *d, scene *out);
 /* Converts the key `meshes`: for each mesh, the field by which its vertices are displaced (scene_warp), and the planes
  * at which it is mirrored (scene_mirror). */
 insitu_status scene_convert_mesh_transforms(const scene_document *d, const scene_file *in, scene *out);
-void scene_free_meshes(scene *s);
+void scene_free_mesh_transforms(scene *s);
 
 /* Returns an error if two outputs would be written to the same file. */
-insitu_status scene_check_outputs(const scene_document *d, const scene *s);
+insitu_status scene_check_output_paths_differ(const scene_document *d, const scene *s);
 
 #endif

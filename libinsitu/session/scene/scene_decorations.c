@@ -7,8 +7,8 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-static insitu_status convert_text(const scene_document *d, const char *path, const char *key, const char *text,
-                                  char **out)
+static insitu_status check_and_copy_text(const scene_document *d, const char *path, const char *key, const char *text,
+                                         char **out)
 {
     const insitu_status status = scene_check_placeholders(d, path, key, text);
     if (status) return status;
@@ -16,8 +16,8 @@ static insitu_status convert_text(const scene_document *d, const char *path, con
     return *out ? INSITU_OK : scene_fail_for_memory(d);
 }
 
-static insitu_status convert_words(const scene_document *d, const char *path, const scene_file_decorations *in,
-                                   scene_decorations *out)
+static insitu_status convert_text_decorations(const scene_document *d, const char *path,
+                                              const scene_file_decorations *in, scene_decorations *out)
 {
     insitu_status status = INSITU_OK;
     out->words = base_calloc((size_t)in->text_count, sizeof *out->words);
@@ -27,13 +27,13 @@ static insitu_status convert_words(const scene_document *d, const char *path, co
         snprintf(words_path, sizeof words_path, "%s.text[%d]", path, i);
         out->words_count++;
         out->words[i].anchor = in->text[i].at ? (scene_anchor)*in->text[i].at : SCENE_TOP_LEFT;
-        status = convert_text(d, words_path, "text", in->text[i].text, &out->words[i].text);
+        status = check_and_copy_text(d, words_path, "text", in->text[i].text, &out->words[i].text);
     }
     return status;
 }
 
-static insitu_status convert_bars(const scene_document *d, const char *path, const scene_file_colour_bar *in,
-                                  scene_decorations *out)
+static insitu_status convert_colour_bar_settings(const scene_document *d, const char *path,
+                                                 const scene_file_colour_bar *in, scene_decorations *out)
 {
     char labels_path[SCENE_PATH_SIZE + 8], units_path[SCENE_PATH_SIZE + 8];
     snprintf(labels_path, sizeof labels_path, "%s.colour_bar.labels", path);
@@ -63,9 +63,9 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
     out->has_colour = in->colour != NULL;
     for (int i = 0; in->colour && i < 3; i++) out->colour[i] = colour_linear_from_srgb((float)in->colour[i]);
     out->size = in->size ? *in->size : 0.03;
-    insitu_status status = in->title ? convert_text(d, path, "title", in->title, &out->title) : INSITU_OK;
-    if (!status) status = convert_words(d, path, in, out);
-    return status ? status : convert_bars(d, path, in->colour_bar, out);
+    insitu_status status = in->title ? check_and_copy_text(d, path, "title", in->title, &out->title) : INSITU_OK;
+    if (!status) status = convert_text_decorations(d, path, in, out);
+    return status ? status : convert_colour_bar_settings(d, path, in->colour_bar, out);
 }
 
 void scene_free_decorations(scene_decorations *decorations)

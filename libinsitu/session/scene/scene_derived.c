@@ -19,8 +19,8 @@ enum { KEYS = sizeof keys / sizeof *keys, KEY_SIZE = SCENE_PATH_SIZE + 16, SPACE
 
 /* ---- inputs of derived fields ----------------------------------------------------------------------------------- */
 
-static insitu_status add_input(const scene_document *d, const char *path, const scene_reference *reference,
-                               scene_derived *out)
+static insitu_status add_input_field(const scene_document *d, const char *path, const scene_reference *reference,
+                                     scene_derived *out)
 {
     scene_field *inputs = base_realloc(out->inputs, (size_t)(out->input_count + 1) * sizeof *inputs);
     if (!inputs) return scene_fail_for_memory(d);
@@ -28,7 +28,7 @@ static insitu_status add_input(const scene_document *d, const char *path, const 
     inputs[out->input_count] = (scene_field){.name = base_strdup(reference->name),
                                              .component = reference->component,
                                              .at_vertices = true,
-                                             .line = scene_document_line(d, path)};
+                                             .line = scene_get_line_number_at_path(d, path)};
     return inputs[out->input_count++].name ? INSITU_OK : scene_fail_for_memory(d);
 }
 
@@ -42,13 +42,14 @@ static insitu_status store_expression(const scene_document *d, const char *path,
     if (out->expression.input_count == 0)
         return scene_fail_at_key(d, path, "", "\"%.60s\" names no field, expected one at least", text);
     for (int i = 0; i < out->expression.input_count && !status; i++)
-        status = add_input(d, path, &out->expression.inputs[i], out);
+        status = add_input_field(d, path, &out->expression.inputs[i], out);
     return status;
 }
 
 /* Reads a text that consists of the name of a field, which may be followed by a component, and adds this field to the
  * inputs. Any other text is an error. */
-static insitu_status add_reference(const scene_document *d, const char *path, const char *text, scene_derived *out)
+static insitu_status parse_and_add_input_field(const scene_document *d, const char *path, const char *text,
+                                               scene_derived *out)
 {
     scene_expression one;
     char fault[SCENE_FAULT_SIZE];
@@ -63,7 +64,7 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
             "own, and name that",
             text);
     else
-        status = add_input(d, path, &one.inputs[0], out);
+        status = add_input_field(d, path, &one.inputs[0], out);
     scene_expression_free(&one);
     return status;
 }
@@ -72,14 +73,14 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
 static insitu_status read_references(const scene_document *d, const char *path, scene_derived *out)
 {
     const char *texts[SPACE];
-    const int count = scene_document_texts(d, path, texts, SPACE);
-    const bool is_list = scene_document_kind(d, path) == SCENE_LIST;
+    const int count = scene_list_texts_at_path(d, path, texts, SPACE);
+    const bool is_list = scene_get_node_type_at_path(d, path) == SCENE_LIST;
     insitu_status status = INSITU_OK;
     if (is_list && (out->kind == SCENE_GRADIENT_OF || count < 2 || count > SPACE))
         return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count,
                                  out->kind == SCENE_GRADIENT_OF ? "the name of a field"
                                                                 : "the name of a field, or a list of 2 or 3 scalars");
-    for (int i = 0; i < count && !status; i++) status = add_reference(d, path, texts[i], out);
+    for (int i = 0; i < count && !status; i++) status = parse_and_add_input_field(d, path, texts[i], out);
     for (int i = 0; i < out->input_count && !is_list && !status; i++)
         if (out->inputs[i].component >= 0 && out->kind != SCENE_GRADIENT_OF)
             status = scene_fail_at_key(d, path, "", "\"%.60s\" is a component, expected a field of 2 or 3 components",
@@ -89,13 +90,14 @@ static insitu_status read_references(const scene_document *d, const char *path, 
 
 /* Reads the field that the key `field` or `magnitude` of a derived field names. The derived field becomes an expression
  * that consists only of this input, with the given component. */
-static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
+static insitu_status read_single_input_field(const scene_document *d, const char *path, int component,
+                                             scene_derived *out)
 {
     const char *text = NULL;
-    if (scene_document_kind(d, path) == SCENE_LIST)
+    if (scene_get_node_type_at_path(d, path) == SCENE_LIST)
         return scene_fail_at_key(d, path, "", "a list is not allowed, expected the name of a field");
-    scene_document_texts(d, path, &text, 1);
-    insitu_status status = add_reference(d, path, text, out);
+    scene_list_texts_at_path(d, path, &text, 1);
+    insitu_status status = parse_and_add_input_field(d, path, text, out);
     if (status) return status;
     if (out->inputs[0].component >= 0)
         return scene_fail_at_key(d, path, "", "\"%.60s\" is a component, expected the name of a field", text);
@@ -111,14 +113,15 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
 
 /* Finds the key of a derived field that tells how the field is computed, such as `gradient`, and checks that there is
  * exactly one. *found receives the key's index in `keys`, or -1 for an expression. */
-static insitu_status find_kind_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
+static insitu_status find_key_of_operation(const scene_document *d, const char *path, const scene_file_derived *in,
+                                           int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
     *found = -1;
     for (int i = 0; i < KEYS; i++) {
         char key_path[KEY_SIZE];
         snprintf(key_path, sizeof key_path, "%s.%s", path, keys[i].key);
-        if (scene_document_kind(d, key_path) == SCENE_NOTHING) continue;
+        if (scene_get_node_type_at_path(d, key_path) == SCENE_NOTHING) continue;
         if (first) return scene_fail_at_key(d, path, keys[i].key, "given beside %s, expected one of the two", first);
         first = keys[i].key;
         *found = i;
@@ -132,7 +135,8 @@ static bool takes_component(int key)
                         keys[key].kind == SCENE_VORTICITY);
 }
 
-static insitu_status check_name(const scene_document *d, const char *path, const scene *s, const char *name)
+static insitu_status check_name_of_derived_field(const scene_document *d, const char *path, const scene *s,
+                                                 const char *name)
 {
     if (name[strcspn(name, ".[]\"'")])
         return scene_fail_at_key(
@@ -148,11 +152,11 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
 {
     char key_path[KEY_SIZE];
     int key = -1;
-    out->line = scene_document_line(d, path);
-    insitu_status status = check_name(d, path, s, in->name);
+    out->line = scene_get_line_number_at_path(d, path);
+    insitu_status status = check_name_of_derived_field(d, path, s, in->name);
     out->name = base_strdup(in->name);
     if (!out->name) return scene_fail_for_memory(d);
-    if (!status) status = find_kind_key(d, path, in, &key);
+    if (!status) status = find_key_of_operation(d, path, in, &key);
     if (!status) status = scene_convert_component(d, path, in->component, &out->component);
     if (!status && in->component && !takes_component(key))
         status =
@@ -167,7 +171,8 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
     snprintf(key_path, sizeof key_path, "%s%s%s", path, key < 0 ? "" : ".", out->key);
     if (key < 0) return store_expression(d, path, in->expression, out);
     if (out->kind == SCENE_EXPRESSION)
-        return read_scalar(d, key_path, takes_component(key) ? out->component : SCENE_COMPONENT_MAGNITUDE, out);
+        return read_single_input_field(d, key_path, takes_component(key) ? out->component : SCENE_COMPONENT_MAGNITUDE,
+                                       out);
     return read_references(d, key_path, out);
 }
 
@@ -192,7 +197,7 @@ typedef struct search {
     bool is_done[SCENE_MAX_DERIVED];
 } search;
 
-static insitu_status refuse_cycle(const search *w, int first)
+static insitu_status fail_for_dependency_cycle(const search *w, int first)
 {
     char circle[300] = "";
     const scene_derived *fields = w->s->derived;
@@ -206,17 +211,17 @@ static insitu_status refuse_cycle(const search *w, int first)
                              w->length == first + 1 ? "itself" : fields[w->path[first]].name);
 }
 
-static insitu_status visit_field(search *w, int at)
+static insitu_status visit_dependencies_of_field(search *w, int at)
 {
     scene_derived *field = &w->s->derived[at];
     insitu_status status = INSITU_OK;
     if (w->is_done[at]) return INSITU_OK;
     for (int i = 0; i < w->length; i++)
-        if (w->path[i] == at) return refuse_cycle(w, i);
+        if (w->path[i] == at) return fail_for_dependency_cycle(w, i);
     w->path[w->length++] = at;
     for (int i = 0; i < field->input_count && !status; i++) {
         const int source = scene_find_derived(w->s, field->inputs[i].name);
-        if (source >= 0) status = visit_field(w, source);
+        if (source >= 0) status = visit_dependencies_of_field(w, source);
     }
     w->length--;
     w->is_done[at] = true;
@@ -224,13 +229,13 @@ static insitu_status visit_field(search *w, int at)
     return status;
 }
 
-static insitu_status sort_fields(const scene_document *d, scene *s)
+static insitu_status sort_derived_fields_by_dependency(const scene_document *d, scene *s)
 {
     search w = {.d = d, .s = s};
     insitu_status status = INSITU_OK;
     scene_derived *sorted = base_calloc((size_t)s->derived_count, sizeof *sorted);
     if (!sorted) return scene_fail_for_memory(d);
-    for (int i = 0; i < s->derived_count && !status; i++) status = visit_field(&w, i);
+    for (int i = 0; i < s->derived_count && !status; i++) status = visit_dependencies_of_field(&w, i);
     for (int i = 0; i < s->derived_count && !status; i++) sorted[i] = s->derived[w.order[i]];
     if (!status) memcpy(s->derived, sorted, (size_t)s->derived_count * sizeof *sorted);
     base_free(sorted);
@@ -253,14 +258,14 @@ insitu_status scene_convert_derived(const scene_document *d, const scene_file *i
     for (int i = 0; i < in->fields_count && !status; i++) {
         const char *name = in->fields[i].name;
         char path[SCENE_PATH_SIZE];
-        if (scene_is_plain_name(name))
+        if (scene_is_valid_path_name(name))
             snprintf(path, sizeof path, "fields.%s", name);
         else
             snprintf(path, sizeof path, "fields[%d]", i);
         status = convert_derived(d, path, &in->fields[i], out, &out->derived[out->derived_count]);
         out->derived_count++;
     }
-    return status ? status : sort_fields(d, out);
+    return status ? status : sort_derived_fields_by_dependency(d, out);
 }
 
 void scene_free_derived(scene *s)

@@ -40,8 +40,8 @@ static size_t count_lines_before(const char *text, size_t size, size_t offset)
     return lines;
 }
 
-static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text,
-                                     size_t size)
+static insitu_status report_yaml_parser_error(const scene_document *d, const yaml_parser_t *parser, const char *text,
+                                              size_t size)
 {
     /* libyaml does not set an error for some failed allocations */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
@@ -58,7 +58,7 @@ static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_
     return fail_at_line(d, line, what);
 }
 
-static const char *find_event_fault(const yaml_event_t *event, int *depth, int *documents)
+static const char *find_unsupported_yaml_feature(const yaml_event_t *event, int *depth, int *documents)
 {
     const yaml_char_t *anchor = NULL, *tag = NULL;
     switch (event->type) {
@@ -81,7 +81,7 @@ static const char *find_event_fault(const yaml_event_t *event, int *depth, int *
     return *depth > SCENE_MAX_DEPTH ? "lists and mappings are nested too deep, expected at most 16 levels" : NULL;
 }
 
-static insitu_status scan_events(const scene_document *d, const char *text, size_t size)
+static insitu_status check_yaml_events(const scene_document *d, const char *text, size_t size)
 {
     yaml_parser_t parser;
     if (!yaml_parser_initialize(&parser)) {
@@ -93,10 +93,10 @@ static insitu_status scan_events(const scene_document *d, const char *text, size
     for (bool is_end = false; status == INSITU_OK && !is_end;) {
         yaml_event_t event;
         if (!yaml_parser_parse(&parser, &event)) {
-            status = fail_for_syntax(d, &parser, text, size);
+            status = report_yaml_parser_error(d, &parser, text, size);
             break;
         }
-        const char *fault = find_event_fault(&event, &depth, &documents);
+        const char *fault = find_unsupported_yaml_feature(&event, &depth, &documents);
         if (fault) status = fail_at_line(d, event.start_mark.line + 1, fault);
         is_end = event.type == YAML_STREAM_END_EVENT;
         yaml_event_delete(&event);
@@ -115,7 +115,7 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
         return base_fail(error, INSITU_ERROR_SCENE, "%.300s:1: the file has %zu bytes, expected at most %d", file_name,
                          size, SCENE_MAX_BYTES);
     }
-    insitu_status status = scan_events(d, text, size);
+    insitu_status status = check_yaml_events(d, text, size);
     if (status != INSITU_OK) return status;
 
     yaml_parser_t parser;
@@ -123,7 +123,7 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
         return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", file_name);
     }
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
-    if (!yaml_parser_load(&parser, &d->yaml)) status = fail_for_syntax(d, &parser, text, size);
+    if (!yaml_parser_load(&parser, &d->yaml)) status = report_yaml_parser_error(d, &parser, text, size);
     yaml_parser_delete(&parser);
     if (status == INSITU_OK && !scene_expand_shorthand(&d->yaml)) {
         scene_document_close(d);
@@ -149,7 +149,7 @@ static yaml_node_t *find_node_by_index(const scene_document *d, int index)
     return yaml_document_get_node((yaml_document_t *)&d->yaml, index);
 }
 
-static int node_line(const yaml_node_t *node)
+static int get_line_number_of_node(const yaml_node_t *node)
 {
     return (int)node->start_mark.line + 1;
 }
@@ -159,13 +159,13 @@ static int count_items(const yaml_node_t *list)
     return (int)(list->data.sequence.items.top - list->data.sequence.items.start);
 }
 
-static const char *node_text(const yaml_node_t *scalar)
+static const char *get_text_of_scalar(const yaml_node_t *scalar)
 {
     return (const char *)scalar->data.scalar.value;
 }
 
 /* Writes the node's text in quotes, shortened for a message. */
-static void quote_node(const yaml_node_t *node, char quoted[quote_size])
+static void write_quoted_node_text(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
         snprintf(quoted, quote_size, "a list");
@@ -175,12 +175,12 @@ static void quote_node(const yaml_node_t *node, char quoted[quote_size])
         snprintf(quoted, quote_size, "nothing");
     } else {
         const bool is_long = node->data.scalar.length > 36;
-        snprintf(quoted, quote_size, "\"%.36s%s\"", node_text(node), is_long ? "..." : "");
+        snprintf(quoted, quote_size, "\"%.36s%s\"", get_text_of_scalar(node), is_long ? "..." : "");
     }
 }
 
-static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_node_t *mapping, const char *name,
-                                         size_t length)
+static const yaml_node_pair_t *find_key_value_pair(const scene_document *d, const yaml_node_t *mapping,
+                                                   const char *name, size_t length)
 {
     for (const yaml_node_pair_t *p = mapping->data.mapping.pairs.start; p < mapping->data.mapping.pairs.top; p++) {
         const yaml_node_t *key = find_node_by_index(d, p->key);
@@ -191,7 +191,7 @@ static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_nod
     return NULL;
 }
 
-bool scene_is_plain_name(const char *name)
+bool scene_is_valid_path_name(const char *name)
 {
     return *name && strlen(name) <= most_plain && !name[strcspn(name, ".[")];
 }
@@ -202,7 +202,8 @@ static const yaml_node_t *find_entry_by_name(const scene_document *d, const yaml
 {
     for (int i = 0; i < count_items(list); i++) {
         const yaml_node_t *entry = find_node_by_index(d, list->data.sequence.items.start[i]);
-        const yaml_node_pair_t *pair = entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
+        const yaml_node_pair_t *pair =
+            entry->type == YAML_MAPPING_NODE ? find_key_value_pair(d, entry, "name", 4) : NULL;
         const yaml_node_t *text = pair ? find_node_by_index(d, pair->value) : NULL;
         if (text && text->type == YAML_SCALAR_NODE && text->data.scalar.length == length &&
             memcmp(text->data.scalar.value, name, length) == 0)
@@ -213,17 +214,17 @@ static const yaml_node_t *find_entry_by_name(const scene_document *d, const yaml
 
 /* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the deepest node of
  * the path that exists. */
-static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
+static const yaml_node_t *find_node_at_path(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
-    *line = node_line(node);
+    *line = get_line_number_of_node(node);
     while (*path) {
         if (*path == '[') {
             char *end;
             const long index = strtol(path + 1, &end, 10);
             if (node->type != YAML_SEQUENCE_NODE || index >= count_items(node)) return NULL;
             node = find_node_by_index(d, node->data.sequence.items.start[index]);
-            *line = node_line(node);
+            *line = get_line_number_of_node(node);
             path = end + 1;
         } else {
             path += *path == '.';
@@ -231,14 +232,14 @@ static const yaml_node_t *find_node(const scene_document *d, const char *path, i
             if (node->type == YAML_SEQUENCE_NODE) {
                 node = find_entry_by_name(d, node, path, length);
                 if (!node) return NULL;
-                *line = node_line(node);
+                *line = get_line_number_of_node(node);
                 path += length;
                 continue;
             }
             if (node->type != YAML_MAPPING_NODE) return NULL;
-            const yaml_node_pair_t *pair = find_pair(d, node, path, length);
+            const yaml_node_pair_t *pair = find_key_value_pair(d, node, path, length);
             if (!pair) return NULL;
-            *line = node_line(find_node_by_index(d, pair->key));
+            *line = get_line_number_of_node(find_node_by_index(d, pair->key));
             node = find_node_by_index(d, pair->value);
             path += length;
         }
@@ -246,60 +247,60 @@ static const yaml_node_t *find_node(const scene_document *d, const char *path, i
     return node;
 }
 
-int scene_document_line(const scene_document *d, const char *path)
+int scene_get_line_number_at_path(const scene_document *d, const char *path)
 {
     int line;
-    find_node(d, path, &line);
+    find_node_at_path(d, path, &line);
     return line;
 }
 
-int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most)
+int scene_list_texts_at_path(const scene_document *d, const char *path, const char **texts, int most)
 {
     int line;
-    const yaml_node_t *node = find_node(d, path, &line);
+    const yaml_node_t *node = find_node_at_path(d, path, &line);
     if (!node) return 0;
     if (node->type == YAML_SCALAR_NODE) {
-        if (most > 0) texts[0] = node_text(node);
+        if (most > 0) texts[0] = get_text_of_scalar(node);
         return 1;
     }
     const int count = count_items(node);
     for (int i = 0; i < count && i < most; i++)
-        texts[i] = node_text(find_node_by_index(d, node->data.sequence.items.start[i]));
+        texts[i] = get_text_of_scalar(find_node_by_index(d, node->data.sequence.items.start[i]));
     return count;
 }
 
-int scene_document_names(const scene_document *d, const char *path, const char **names, int most)
+int scene_list_keys_at_path(const scene_document *d, const char *path, const char **names, int most)
 {
     int line, count = 0;
-    const yaml_node_t *node = find_node(d, path, &line);
+    const yaml_node_t *node = find_node_at_path(d, path, &line);
     if (!node || node->type != YAML_MAPPING_NODE) return 0;
     for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < node->data.mapping.pairs.top; p++, count++)
-        if (count < most) names[count] = node_text(find_node_by_index(d, p->key));
+        if (count < most) names[count] = get_text_of_scalar(find_node_by_index(d, p->key));
     return count;
 }
 
-scene_node scene_document_kind(const scene_document *d, const char *path)
+scene_node scene_get_node_type_at_path(const scene_document *d, const char *path)
 {
     int line;
-    const yaml_node_t *node = find_node(d, path, &line);
+    const yaml_node_t *node = find_node_at_path(d, path, &line);
     if (!node) return SCENE_NOTHING;
     return node->type == YAML_SCALAR_NODE     ? SCENE_SCALAR
            : node->type == YAML_SEQUENCE_NODE ? SCENE_LIST
                                               : SCENE_MAPPING;
 }
 
-int scene_document_length(const scene_document *d, const char *path)
+int scene_get_list_length_at_path(const scene_document *d, const char *path)
 {
     int line;
-    const yaml_node_t *node = find_node(d, path, &line);
+    const yaml_node_t *node = find_node_at_path(d, path, &line);
     return node && node->type == YAML_SEQUENCE_NODE ? count_items(node) : 0;
 }
 
-double scene_document_number(const scene_document *d, const char *path)
+double scene_get_number_at_path(const scene_document *d, const char *path)
 {
     int line;
-    const yaml_node_t *node = find_node(d, path, &line);
-    return node && node->type == YAML_SCALAR_NODE ? strtod(node_text(node), NULL) : 0;
+    const yaml_node_t *node = find_node_at_path(d, path, &line);
+    return node && node->type == YAML_SCALAR_NODE ? strtod(get_text_of_scalar(node), NULL) : 0;
 }
 
 insitu_status scene_fail_for_memory(const scene_document *d)
@@ -315,8 +316,8 @@ insitu_status scene_fail_at_key(const scene_document *d, const char *parent, con
     va_start(arguments, format);
     vsnprintf(what, sizeof what, format, arguments);
     va_end(arguments);
-    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%s%s", d->file_name, scene_document_line(d, path),
-                     path, *path ? ": " : "", what);
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%s%s", d->file_name,
+                     scene_get_line_number_at_path(d, path), path, *path ? ": " : "", what);
 }
 
 /* ---- check of the tree against the schema ---- */
@@ -325,14 +326,16 @@ insitu_status scene_fail_at_key(const scene_document *d, const char *parent, con
 static void suggest_candidate(const yaml_node_t *word, const char *const *candidates, int count,
                               char question[question_size])
 {
-    const char *meant = word->type == YAML_SCALAR_NODE ? scene_nearest_word(node_text(word), candidates, count) : NULL;
+    const char *meant = word->type == YAML_SCALAR_NODE
+                            ? scene_find_most_similar_word(get_text_of_scalar(word), candidates, count)
+                            : NULL;
     question[0] = '\0';
     if (meant) snprintf(question, question_size, " (did you mean %.64s?)", meant);
 }
 
 /* Lists the words that the schema allows as a value, in all forms of the value. Returns their number, at most
  * `most`. */
-static int list_choices(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
+static int list_allowed_words(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
 {
     int count = 0;
     if (value->type == CYAML_BOOL && most > 1) {
@@ -343,7 +346,7 @@ static int list_choices(const cyaml_schema_value_t *value, const scene_key *key,
         for (uint32_t i = 0; i < value->enumeration.count && count < most; i++)
             words[count++] = value->enumeration.strings[i].str;
     for (int i = 0; value->type == CYAML_IGNORE && i < key->form_count; i++)
-        count += list_choices(&key->forms[i].value, &key->forms[i].key, words + count, most - count);
+        count += list_allowed_words(&key->forms[i].value, &key->forms[i].key, words + count, most - count);
     return count;
 }
 
@@ -367,7 +370,7 @@ static void convert_text_to_list(const char *text, const cyaml_schema_value_t *v
     if (!is_right) list[0] = '\0';
 }
 
-static bool read_number(const char *text, double *number)
+static bool parse_finite_number(const char *text, double *number)
 {
     char *end;
     /* strtod() would also accept nan, inf and hexadecimal numbers */
@@ -382,7 +385,7 @@ static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *
                                     char question[question_size])
 {
     size_t length;
-    const char *colour = scene_find_colour_in_comment(d->text, d->size, (size_t)node_line(node), &length);
+    const char *colour = scene_find_colour_in_comment(d->text, d->size, (size_t)get_line_number_of_node(node), &length);
     if (colour)
         snprintf(question, question_size, " (did you mean \"%.*s\" in quotes?)", (int)length, colour);
     else if (value->type == CYAML_MAPPING)
@@ -406,7 +409,7 @@ static void suggest_mapping(const char *word, const cyaml_schema_value_t *mappin
         if (!isalnum((unsigned char)*at) && *at != '_') return;
     if (mapping_has_key(mapping, word))
         snprintf(question, question_size, " (did you mean %s%.32s: {}%s?)", begin, word, end);
-    else if (mapping_has_key(mapping, "field") && !read_number(word, &number))
+    else if (mapping_has_key(mapping, "field") && !parse_finite_number(word, &number))
         snprintf(question, question_size, " (did you mean %sfield: %.32s%s?)", begin, word, end);
 }
 
@@ -417,7 +420,7 @@ static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t 
 {
     const bool is_empty = node->data.mapping.pairs.top == node->data.mapping.pairs.start;
     const yaml_node_t *first = is_empty ? NULL : find_node_by_index(d, node->data.mapping.pairs.start->key);
-    const char *name = first && first->type == YAML_SCALAR_NODE ? node_text(first) : NULL;
+    const char *name = first && first->type == YAML_SCALAR_NODE ? get_text_of_scalar(first) : NULL;
     if (name && mapping_has_key(entry, "name") && !mapping_has_key(entry, name))
         snprintf(question, question_size, " (did you mean \"- name: %.32s\"?)", name);
     else
@@ -426,8 +429,9 @@ static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t 
 
 /* Writes a question that suggests another form in which the value would be valid: in quotes, as a list, or as an entry
  * of a list. */
-static void suggest_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
-                         const scene_key *key, char question[question_size])
+static void suggest_valid_form_of_value(const scene_document *d, const yaml_node_t *node,
+                                        const cyaml_schema_value_t *value, const scene_key *key,
+                                        char question[question_size])
 {
     const bool is_list = value->type == CYAML_SEQUENCE || value->type == CYAML_SEQUENCE_FIXED;
     const cyaml_type_e entry = is_list ? value->sequence.entry->type : CYAML_IGNORE;
@@ -436,41 +440,41 @@ static void suggest_form(const scene_document *d, const yaml_node_t *node, const
     if (node->type == YAML_SCALAR_NODE && node->data.scalar.length == 0) {
         suggest_for_empty_value(d, node, value, question);
     } else if (node->type == YAML_SCALAR_NODE && is_list) {
-        const char *text = node_text(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
+        const char *text = get_text_of_scalar(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
         if (entry == CYAML_INT || entry == CYAML_FLOAT) convert_text_to_list(text, value, list);
-        if (scene_is_colour(value, key) && strspn(digits, "0123456789abcdefABCDEF") == 6 && !digits[6])
+        if (scene_is_colour_schema(value, key) && strspn(digits, "0123456789abcdefABCDEF") == 6 && !digits[6])
             snprintf(question, question_size, " (did you mean \"#%s\" in quotes?)", digits);
         else if (*list)
             snprintf(question, question_size, " (did you mean %s?)", list);
         else if (entry == CYAML_SEQUENCE_FIXED && value->sequence.entry->sequence.max == 2 &&
-                 read_number(text, &number))
+                 parse_finite_number(text, &number))
             snprintf(question, question_size, " (did you mean [[0, %.24s], [1, %.24s]]?)", text, text);
         else if (entry == CYAML_MAPPING)
             suggest_mapping(text, value->sequence.entry, "[{", "}]", question);
     } else if (node->type == YAML_SCALAR_NODE && value->type == CYAML_MAPPING) {
-        suggest_mapping(node_text(node), value, "{", "}", question);
+        suggest_mapping(get_text_of_scalar(node), value, "{", "}", question);
     } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
         suggest_list_of_mappings(d, node, value->sequence.entry, question);
     } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
         const yaml_node_t *name = find_node_by_index(d, node->data.mapping.pairs.start->key);
         const yaml_node_t *rest = find_node_by_index(d, node->data.mapping.pairs.start->value);
         if (name->type == YAML_SCALAR_NODE && rest->type == YAML_SCALAR_NODE && rest->data.scalar.length == 0)
-            snprintf(question, question_size, " (did you mean \"{%.32s}\" in quotes?)", node_text(name));
+            snprintf(question, question_size, " (did you mean \"{%.32s}\" in quotes?)", get_text_of_scalar(name));
     }
 }
 
-static insitu_status fail_for_value(const scene_document *d, const char *path, const yaml_node_t *node,
-                                    const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status fail_for_invalid_value(const scene_document *d, const char *path, const yaml_node_t *node,
+                                            const cyaml_schema_value_t *value, const scene_key *key)
 {
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
-    quote_node(node, quoted);
+    write_quoted_node_text(node, quoted);
     scene_describe_expected_value(path, value, key, expected);
-    int count = list_choices(value, key, words, most_words);
+    int count = list_allowed_words(value, key, words, most_words);
     const bool is_switch = count == 0 && strstr(expected, "true or false");
     if (is_switch) words[count++] = "true", words[count++] = "false";
     suggest_candidate(node, words, count, question);
-    if (!*question) suggest_form(d, node, value, key, question);
+    if (!*question) suggest_valid_form_of_value(d, node, value, key, question);
     const bool is_entry = *path && path[strlen(path) - 1] == ']';
     if (!*question && is_entry && value->type == CYAML_SEQUENCE_FIXED && node->type == YAML_SCALAR_NODE)
         snprintf(question, question_size, " (each entry is a list of its own, in [ ])");
@@ -478,7 +482,7 @@ static insitu_status fail_for_value(const scene_document *d, const char *path, c
 }
 
 /* Reads a decimal whole number. A leading zero is rejected, because 010 could mean 10 or 8. */
-static bool read_whole_number(const char *text, double *number)
+static bool parse_decimal_integer(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
     const size_t count = strspn(digits, "0123456789");
@@ -495,7 +499,7 @@ static bool is_in_range(double number, const scene_key *key)
 }
 
 /* Returns the schema's choice whose word is this text, or NULL if there is none. */
-static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_value_t *value)
+static const cyaml_strval_t *find_enum_entry(const char *text, const cyaml_schema_value_t *value)
 {
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
         if (strcmp(text, value->enumeration.strings[i].str) == 0) return &value->enumeration.strings[i];
@@ -506,15 +510,15 @@ static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_va
 static bool is_valid_scalar(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
 {
     if (node->type != YAML_SCALAR_NODE) return false;
-    const char *text = node_text(node);
+    const char *text = get_text_of_scalar(node);
     const size_t length = strlen(text);
     if (length != node->data.scalar.length) return false; /* false for a text that contains a NUL */
     double number;
     switch (value->type) {
-    case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
-    case CYAML_FLOAT: return read_number(text, &number) && is_in_range(number, key);
+    case CYAML_INT: return parse_decimal_integer(text, &number) && is_in_range(number, key);
+    case CYAML_FLOAT: return parse_finite_number(text, &number) && is_in_range(number, key);
     case CYAML_BOOL: return strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
-    case CYAML_ENUM: return find_choice(text, value) != NULL;
+    case CYAML_ENUM: return find_enum_entry(text, value) != NULL;
     case CYAML_IGNORE: return length >= 1 && length <= SCENE_NAME_BYTES;
     default: return length >= value->string.min && length <= value->string.max;
     }
@@ -540,83 +544,83 @@ static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value
 static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                   void *to)
 {
-    const char *text = node_text(node);
+    const char *text = get_text_of_scalar(node);
     if (to && value->type == CYAML_STRING) memcpy(to, &text, sizeof text);
     if (!to || value->type == CYAML_STRING) return INSITU_OK;
     if (!allocate_values(d, value, 1, &to)) return scene_fail_for_memory(d);
     switch (value->type) {
     case CYAML_INT: *(int *)to = (int)strtol(text, NULL, 10); break;
-    case CYAML_ENUM: *(int *)to = (int)find_choice(text, value)->val; break;
+    case CYAML_ENUM: *(int *)to = (int)find_enum_entry(text, value)->val; break;
     case CYAML_BOOL: *(bool *)to = *text == 't'; break;
     default: *(double *)to = strtod(text, NULL); break;
     }
     return INSITU_OK;
 }
 
-static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key, void *to);
+static insitu_status check_and_store_value(scene_document *d, const char *path, const yaml_node_t *node,
+                                           const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
 /* Writes the path of an entry of a list. The last part of the path is the entry's name if it has one, and otherwise its
  * index. */
-static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
-                            int index, char out[path_size])
+static void write_path_of_list_entry(const scene_document *d, const char *path, const yaml_node_t *list,
+                                     const scene_key *key, int index, char out[path_size])
 {
     const yaml_node_t *entry = find_node_by_index(d, list->data.sequence.items.start[index]);
     const yaml_node_pair_t *pair =
-        key->is_named && entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
+        key->is_named && entry->type == YAML_MAPPING_NODE ? find_key_value_pair(d, entry, "name", 4) : NULL;
     const yaml_node_t *name = pair ? find_node_by_index(d, pair->value) : NULL;
-    if (name && name->type == YAML_SCALAR_NODE && scene_is_plain_name(node_text(name)))
-        snprintf(out, path_size, "%s.%s", path, node_text(name));
+    if (name && name->type == YAML_SCALAR_NODE && scene_is_valid_path_name(get_text_of_scalar(name)))
+        snprintf(out, path_size, "%s.%s", path, get_text_of_scalar(name));
     else
         snprintf(out, path_size, "%s[%d]", path, index);
 }
 
-static insitu_status fail_for_count(const scene_document *d, const char *path, int count,
-                                    const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status fail_for_list_length(const scene_document *d, const char *path, int count,
+                                          const cyaml_schema_value_t *value, const scene_key *key)
 {
     char expected[SCENE_WORDS_SIZE];
     scene_describe_value(value, key, expected);
     return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
 }
 
-static insitu_status check_list(scene_document *d, const char *path, const yaml_node_t *node,
-                                const cyaml_schema_value_t *value, const scene_key *key, void *to)
+static insitu_status check_and_store_list(scene_document *d, const char *path, const yaml_node_t *node,
+                                          const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
-    if (node->type != YAML_SEQUENCE_NODE) return fail_for_value(d, path, node, value, key);
+    if (node->type != YAML_SEQUENCE_NODE) return fail_for_invalid_value(d, path, node, value, key);
     const int count = count_items(node);
     if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max)
-        return fail_for_count(d, path, count, value, key);
+        return fail_for_list_length(d, path, count, value, key);
     if (!allocate_values(d, value, count, &to)) return scene_fail_for_memory(d);
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
         char item_path[path_size];
-        write_item_path(d, path, node, key, i, item_path);
+        write_path_of_list_entry(d, path, node, key, i, item_path);
         void *item = to ? (char *)to + (size_t)i * value->data_size : NULL;
-        status = check_value(d, item_path, find_node_by_index(d, node->data.sequence.items.start[i]),
-                             value->sequence.entry, key, item);
+        status = check_and_store_value(d, item_path, find_node_by_index(d, node->data.sequence.items.start[i]),
+                                       value->sequence.entry, key, item);
     }
     return status;
 }
 
 /* Checks a value that is a name, or a list of names. */
-static insitu_status check_names(scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status check_name_or_list_of_names(scene_document *d, const char *path, const yaml_node_t *node,
+                                                 const cyaml_schema_value_t *value, const scene_key *key)
 {
     static const cyaml_schema_value_t one = {CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char, 1, SCENE_NAME_BYTES)};
     if (node->type != YAML_SEQUENCE_NODE)
-        return is_valid_scalar(node, value, key) ? INSITU_OK : fail_for_value(d, path, node, value, key);
+        return is_valid_scalar(node, value, key) ? INSITU_OK : fail_for_invalid_value(d, path, node, value, key);
     const int count = count_items(node);
-    if (count < 1 || count > SCENE_MAX_NAMES) return fail_for_count(d, path, count, value, key);
+    if (count < 1 || count > SCENE_MAX_NAMES) return fail_for_list_length(d, path, count, value, key);
     for (int i = 0; i < count; i++) {
         const yaml_node_t *item = find_node_by_index(d, node->data.sequence.items.start[i]);
         char item_path[path_size];
         snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
-        if (!is_valid_scalar(item, value, key)) return fail_for_value(d, item_path, item, &one, key);
+        if (!is_valid_scalar(item, value, key)) return fail_for_invalid_value(d, item_path, item, &one, key);
     }
     return INSITU_OK;
 }
 
-static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *node)
+static bool can_value_have_node_type(const cyaml_schema_value_t *value, const yaml_node_t *node)
 {
     switch (value->type) {
     case CYAML_MAPPING: return node->type == YAML_MAPPING_NODE;
@@ -627,16 +631,16 @@ static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *n
 }
 
 /* Checks the node against the first form of the value that allows the node's type (scalar, list or mapping). */
-static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status check_against_alternative_forms(scene_document *d, const char *path, const yaml_node_t *node,
+                                                     const cyaml_schema_value_t *value, const scene_key *key)
 {
     for (int i = 0; i < key->form_count; i++) {
         const scene_form *form = &key->forms[i];
-        if (!accepts_node(&form->value, node)) continue;
+        if (!can_value_have_node_type(&form->value, node)) continue;
         if (node->type == YAML_SCALAR_NODE && !is_valid_scalar(node, &form->value, &form->key)) break;
-        return check_value(d, path, node, &form->value, &form->key, NULL);
+        return check_and_store_value(d, path, node, &form->value, &form->key, NULL);
     }
-    return fail_for_value(d, path, node, value, key);
+    return fail_for_invalid_value(d, path, node, value, key);
 }
 
 /* Returns whether a name that the scene defines is allowed. Such names occur in paths in messages, and simulations pass
@@ -646,7 +650,7 @@ static bool is_valid_scene_name(const yaml_node_t *name)
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
     if (name->type != YAML_SCALAR_NODE || name->data.scalar.length > SCENE_KEY_BYTES) return false;
     size_t i = 0;
-    for (const char *text = node_text(name); i < name->data.scalar.length; i++)
+    for (const char *text = get_text_of_scalar(name); i < name->data.scalar.length; i++)
         if (!text[i] || !(strchr(letters, text[i]) || (i && strchr(digits, text[i])))) return false;
     return i > 0;
 }
@@ -655,7 +659,7 @@ static bool is_valid_scene_name(const yaml_node_t *name)
 static insitu_status check_mapping_of_names(scene_document *d, const char *path, const yaml_node_t *node,
                                             const cyaml_schema_value_t *value, const scene_key *key)
 {
-    if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
+    if (node->type != YAML_MAPPING_NODE) return fail_for_invalid_value(d, path, node, value, key);
     const yaml_node_pair_t *first = node->data.mapping.pairs.start, *end = node->data.mapping.pairs.top;
     if (end - first > SCENE_MAX_NAMES)
         return scene_fail_at_key(d, path, "", "%d names are not allowed, expected at most %d", (int)(end - first),
@@ -664,18 +668,19 @@ static insitu_status check_mapping_of_names(scene_document *d, const char *path,
     for (const yaml_node_pair_t *p = first; p < end && !status; p++) {
         const yaml_node_t *name = find_node_by_index(d, p->key);
         char quoted[quote_size], own_path[path_size];
-        quote_node(name, quoted);
+        write_quoted_node_text(name, quoted);
         if (!is_valid_scene_name(name))
             return base_fail(d->error, INSITU_ERROR_SCENE,
                              "%.300s:%d: %s: the name %s is not allowed, expected a letter or _ and then letters, "
                              "digits, _ or -, at most %d bytes",
-                             d->file_name, node_line(name), path, quoted, SCENE_KEY_BYTES);
-        if (find_pair(d, node, node_text(name), name->data.scalar.length) != p)
+                             d->file_name, get_line_number_of_node(name), path, quoted, SCENE_KEY_BYTES);
+        if (find_key_value_pair(d, node, get_text_of_scalar(name), name->data.scalar.length) != p)
             return base_fail(d->error, INSITU_ERROR_SCENE,
                              "%.300s:%d: %s: the name %s is given twice, expected it once", d->file_name,
-                             node_line(name), path, quoted);
-        snprintf(own_path, sizeof own_path, "%s.%s", path, node_text(name));
-        status = check_value(d, own_path, find_node_by_index(d, p->value), &key->named->value, &key->named->key, NULL);
+                             get_line_number_of_node(name), path, quoted);
+        snprintf(own_path, sizeof own_path, "%s.%s", path, get_text_of_scalar(name));
+        status = check_and_store_value(d, own_path, find_node_by_index(d, p->value), &key->named->value,
+                                       &key->named->key, NULL);
     }
     return status;
 }
@@ -684,7 +689,7 @@ static insitu_status check_mapping_of_names(scene_document *d, const char *path,
  * that has a key of this name. */
 static void suggest_parent_of_key(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
-    const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;
+    const char *text = name->type == YAML_SCALAR_NODE ? get_text_of_scalar(name) : "", *holder = NULL;
     int holders = 0;
     for (int i = 0; mapping->fields[i].key; i++) {
         const scene_mapping *child = mapping->keys[i].child;
@@ -700,21 +705,21 @@ static void suggest_parent_of_key(const yaml_node_t *name, const scene_mapping *
             snprintf(question, question_size, " (it stands at the top of the file, beside images)");
 }
 
-static insitu_status fail_for_key(scene_document *d, const char *path, const yaml_node_t *name,
-                                  const scene_mapping *mapping, const char *fault)
+static insitu_status fail_for_invalid_key(scene_document *d, const char *path, const yaml_node_t *name,
+                                          const scene_mapping *mapping, const char *fault)
 {
     const scene_key holder = {.child = mapping};
     const cyaml_schema_value_t value = {.type = CYAML_MAPPING};
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     int count = 0;
-    quote_node(name, quoted);
+    write_quoted_node_text(name, quoted);
     scene_describe_value(&value, &holder, expected);
     for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
     suggest_candidate(name, words, count, question);
     if (!*question) suggest_parent_of_key(name, mapping, question);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
-                     node_line(name), path, *path ? ": " : "", quoted, fault, question, expected);
+                     get_line_number_of_node(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
 /* Returns the reason why a key of earlier versions was removed; NULL if there never was such a key. */
@@ -728,22 +733,22 @@ static const char *find_removal_reason(const char *key)
     return NULL;
 }
 
-static insitu_status check_pair(scene_document *d, const char *path, const yaml_node_pair_t *pair,
-                                const scene_mapping *mapping, unsigned *seen, void *to)
+static insitu_status check_and_store_pair(scene_document *d, const char *path, const yaml_node_pair_t *pair,
+                                          const scene_mapping *mapping, unsigned *seen, void *to)
 {
     const yaml_node_t *name = find_node_by_index(d, pair->key);
     int i = 0;
     while (mapping->fields[i].key &&
-           (name->type != YAML_SCALAR_NODE || strcmp(node_text(name), mapping->fields[i].key) != 0)) {
+           (name->type != YAML_SCALAR_NODE || strcmp(get_text_of_scalar(name), mapping->fields[i].key) != 0)) {
         i++;
     }
     if (!mapping->fields[i].key) {
-        const char *fault = name->type == YAML_SCALAR_NODE ? find_removal_reason(node_text(name)) : NULL;
-        return fail_for_key(d, path, name, mapping, fault ? fault : "unknown");
+        const char *fault = name->type == YAML_SCALAR_NODE ? find_removal_reason(get_text_of_scalar(name)) : NULL;
+        return fail_for_invalid_key(d, path, name, mapping, fault ? fault : "unknown");
     }
     if (*seen & 1u << i)
         return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key \"%s\" is given twice, expected it once",
-                         d->file_name, node_line(name), path, *path ? ": " : "", mapping->fields[i].key);
+                         d->file_name, get_line_number_of_node(name), path, *path ? ": " : "", mapping->fields[i].key);
     *seen |= 1u << i;
     char value_path[path_size];
     snprintf(value_path, sizeof value_path, "%s%s%s", path, *path ? "." : "", mapping->fields[i].key);
@@ -753,17 +758,17 @@ static insitu_status check_pair(scene_document *d, const char *path, const yaml_
     if (to && field->value.type == CYAML_SEQUENCE && node->type == YAML_SEQUENCE_NODE)
         *(int *)((char *)to + field->count_offset) = count_items(node);
     void *place = to ? (char *)to + field->data_offset : NULL;
-    return check_value(d, value_path, node, &field->value, &mapping->keys[i], place);
+    return check_and_store_value(d, value_path, node, &field->value, &mapping->keys[i], place);
 }
 
-static insitu_status check_mapping(scene_document *d, const char *path, const yaml_node_t *node,
-                                   const scene_mapping *mapping, void *to)
+static insitu_status check_and_store_mapping(scene_document *d, const char *path, const yaml_node_t *node,
+                                             const scene_mapping *mapping, void *to)
 {
     unsigned seen = 0;
     insitu_status status = INSITU_OK;
     const yaml_node_pair_t *end = node->data.mapping.pairs.top;
     for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < end && status == INSITU_OK; p++) {
-        status = check_pair(d, path, p, mapping, &seen, to);
+        status = check_and_store_pair(d, path, p, mapping, &seen, to);
     }
     for (int i = 0; mapping->fields[i].key && status == INSITU_OK; i++) {
         if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
@@ -774,29 +779,29 @@ static insitu_status check_mapping(scene_document *d, const char *path, const ya
     return status;
 }
 
-static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key, void *to)
+static insitu_status check_and_store_value(scene_document *d, const char *path, const yaml_node_t *node,
+                                           const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
     switch (value->type) {
     case CYAML_MAPPING:
-        if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
+        if (node->type != YAML_MAPPING_NODE) return fail_for_invalid_value(d, path, node, value, key);
         if (!allocate_values(d, value, 1, &to)) return scene_fail_for_memory(d);
-        return check_mapping(d, path, node, key->child, to);
+        return check_and_store_mapping(d, path, node, key->child, to);
     case CYAML_SEQUENCE:
-    case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);
+    case CYAML_SEQUENCE_FIXED: return check_and_store_list(d, path, node, value, key, to);
     case CYAML_IGNORE:
         return (key->named   ? check_mapping_of_names
-                : key->forms ? check_forms
-                             : check_names)(d, path, node, value, key);
+                : key->forms ? check_against_alternative_forms
+                             : check_name_or_list_of_names)(d, path, node, value, key);
     default:
         return is_valid_scalar(node, value, key) ? store_scalar(d, node, value, to)
-                                                 : fail_for_value(d, path, node, value, key);
+                                                 : fail_for_invalid_value(d, path, node, value, key);
     }
 }
 
-insitu_status scene_document_read(scene_document *d, scene_file **file)
+insitu_status scene_convert_document_to_structs(scene_document *d, scene_file **file)
 {
     const scene_key key = {.child = &scene_top};
     const yaml_node_t *root = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
-    return check_value(d, "", root, &scene_top_value, &key, file);
+    return check_and_store_value(d, "", root, &scene_top_value, &key, file);
 }

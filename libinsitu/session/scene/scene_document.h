@@ -32,33 +32,33 @@ void scene_document_close(scene_document *d);
 /* Checks the document against the schema (keys are known and unique, and none is missing; types, counts and ranges are
  * correct) and stores it in *file. *file is owned by the document and valid until the document is closed; after an
  * error it is undefined. */
-insitu_status scene_document_read(scene_document *d, scene_file **file);
+insitu_status scene_convert_document_to_structs(scene_document *d, scene_file **file);
 
 /* Returns the line (from 1) of a path such as "images[0].size[1]", or of the deepest node of the path that exists. In a
  * list whose entries have the key `name`, a short name without . and [ may replace the index, as in "fields.speed". */
-int scene_document_line(const scene_document *d, const char *path);
+int scene_get_line_number_at_path(const scene_document *d, const char *path);
 
 /* Returns whether a path may contain this name instead of an index: the name is short and contains no . and no [. */
-bool scene_is_plain_name(const char *name);
+bool scene_is_valid_path_name(const char *name);
 
 /* Stores pointers to the texts of the node at a path in `texts`, at most `most` of them. The node must be a text or a
  * list of texts; the document owns the texts. Returns how many texts the node has, even if this is more than `most`; 0
  * if there is no node at the path. */
-int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
+int scene_list_texts_at_path(const scene_document *d, const char *path, const char **texts, int most);
 
 /* Stores pointers to the keys of the mapping at a path, at most `most` of them. The keys must be names that the scene
  * defines; the document owns them. Returns how many keys the mapping has, even if this is more than `most`; 0 if there
  * is no mapping at the path. */
-int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
+int scene_list_keys_at_path(const scene_document *d, const char *path, const char **names, int most);
 
-/* scene_document_kind() tells whether the node at a path is a scalar, a list or a mapping, or does not exist.
- * scene_document_number() returns the node's value if it is a number, otherwise 0. After the document has been checked,
- * a node has a type that the schema allows for its key. */
+/* scene_get_node_type_at_path() tells whether the node at a path is a scalar, a list or a mapping, or does not exist.
+ * scene_get_number_at_path() returns the node's value if it is a number, otherwise 0. After the document has been
+ * checked, a node has a type that the schema allows for its key. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
-scene_node scene_document_kind(const scene_document *d, const char *path);
+scene_node scene_get_node_type_at_path(const scene_document *d, const char *path);
 /* Returns the length of the list at a path; 0 if there is no list. */
-int scene_document_length(const scene_document *d, const char *path);
-double scene_document_number(const scene_document *d, const char *path);
+int scene_get_list_length_at_path(const scene_document *d, const char *path);
+double scene_get_number_at_path(const scene_document *d, const char *path);
 
 /* Records "file:line: parent.key: ..." and returns INSITU_ERROR_SCENE. If the key is empty, the message refers to the
  * parent itself. */

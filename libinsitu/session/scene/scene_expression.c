@@ -57,7 +57,7 @@ __attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *fo
     return false;
 }
 
-static bool fail_for_memory(parser *p)
+static bool record_out_of_memory(parser *p)
 {
     if (p->result == SCENE_PARSED) p->result = SCENE_NO_MEMORY;
     return false;
@@ -81,7 +81,7 @@ static bool is_letter(char c)
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
 }
 
-static char peek_character(parser *p)
+static char skip_blanks_and_peek(parser *p)
 {
     while (is_blank(*p->cursor)) p->cursor++;
     return *p->cursor;
@@ -89,24 +89,24 @@ static char peek_character(parser *p)
 
 static bool accept_character(parser *p, char c)
 {
-    if (peek_character(p) != c) return false;
+    if (skip_blanks_and_peek(p) != c) return false;
     p->cursor++;
     return true;
 }
 
 /* Returns the length of the name, number or sign at the start of the text, for a message; 0 at the end of the text. */
-static int word_length(const char *at)
+static int get_length_of_first_token(const char *at)
 {
     int length = 0;
     while (is_letter(at[length]) || is_digit(at[length])) length++;
     return length ? length : *at != '\0';
 }
 
-static bool fail_expecting(parser *p, const char *expected)
+static bool record_unexpected_text(parser *p, const char *expected)
 {
-    if (peek_character(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
+    if (skip_blanks_and_peek(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
     const int before = (int)(p->cursor - p->text);
-    return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", word_length(p->cursor), p->cursor,
+    return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", get_length_of_first_token(p->cursor), p->cursor,
                 before > 40 ? 40 : before, before > 40 ? p->cursor - 40 : p->text, expected);
 }
 
@@ -118,14 +118,14 @@ static bool add_instruction(parser *p, scene_operation operation, int input, dou
     if (out->count % 16 == 0) {
         scene_instruction *more =
             base_realloc(out->instructions, (size_t)(out->count + 16) * sizeof *out->instructions);
-        if (!more) return fail_for_memory(p);
+        if (!more) return record_out_of_memory(p);
         out->instructions = more;
     }
     out->instructions[out->count++] = (scene_instruction){operation, input, number};
     return true;
 }
 
-static bool push_operand(parser *p, scene_operation operation, int input, double number)
+static bool add_push_instruction(parser *p, scene_operation operation, int input, double number)
 {
     if (++p->stack_count > SCENE_STACK)
         return fail(p, "more than %d intermediate values are open at once, expected fewer brackets or exponents",
@@ -142,7 +142,7 @@ static bool add_operator_instruction(parser *p, scene_operation operation)
 
 /* Emits the instruction for a power. If the exponent is a number, whole and at most MOST_WHOLE_POWER in magnitude, the
  * instruction is SCENE_OP_WHOLE_POWER, which is evaluated by multiplications; otherwise it is SCENE_OP_POWER. */
-static bool add_power(parser *p)
+static bool add_power_instruction(parser *p)
 {
     const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
     const double exponent = last->number;
@@ -155,25 +155,25 @@ static bool add_power(parser *p)
 
 /* ---- parsing fields and functions ------------------------------------------------------------------------------- */
 
-static bool push_input(parser *p, const char *name, int component)
+static bool add_push_input_instruction(parser *p, const char *name, int component)
 {
     scene_expression *out = p->expression;
     for (int i = 0; i < out->input_count; i++)
         if (strcmp(out->inputs[i].name, name) == 0 && out->inputs[i].component == component)
-            return push_operand(p, SCENE_OP_PUSH_INPUT, i, 0);
+            return add_push_instruction(p, SCENE_OP_PUSH_INPUT, i, 0);
     scene_reference *inputs = base_realloc(out->inputs, (size_t)(out->input_count + 1) * sizeof *inputs);
-    if (!inputs) return fail_for_memory(p);
+    if (!inputs) return record_out_of_memory(p);
     out->inputs = inputs;
     inputs[out->input_count] = (scene_reference){base_strdup(name), component};
-    if (!inputs[out->input_count].name) return fail_for_memory(p);
-    return push_operand(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
+    if (!inputs[out->input_count].name) return record_out_of_memory(p);
+    return add_push_instruction(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
 }
 
 /* Reads the component that follows a point (.x, .y, .z or a number). */
 static bool parse_component(parser *p, const char *name, int *component)
 {
     const char *word = p->cursor;
-    const int length = word_length(word), digits = (int)strspn(word, "0123456789");
+    const int length = get_length_of_first_token(word), digits = (int)strspn(word, "0123456789");
     p->cursor += length;
     if (length == 1 && *word >= 'x' && *word <= 'z') {
         *component = *word - 'x';
@@ -202,21 +202,23 @@ static bool parse_name(parser *p, char name[NAME_SIZE])
     return true;
 }
 
-static bool is_name(char c)
+static bool is_start_of_name(char c)
 {
     return is_letter(c) || c == '"' || c == '\'';
 }
 
-static bool parse_magnitude(parser *p)
+static bool parse_argument_of_magnitude(parser *p)
 {
     char name[NAME_SIZE];
-    if (!is_name(peek_character(p))) return fail_expecting(p, "the name of a field, as in mag(velocity)");
+    if (!is_start_of_name(skip_blanks_and_peek(p)))
+        return record_unexpected_text(p, "the name of a field, as in mag(velocity)");
     if (!parse_name(p, name)) return false;
-    if (!accept_character(p, ')')) return fail_expecting(p, ") behind the field's name: mag takes a field alone");
-    return push_input(p, name, SCENE_COMPONENT_MAGNITUDE);
+    if (!accept_character(p, ')'))
+        return record_unexpected_text(p, ") behind the field's name: mag takes a field alone");
+    return add_push_input_instruction(p, name, SCENE_COMPONENT_MAGNITUDE);
 }
 
-static bool parse_operands(parser *p, int function)
+static bool parse_function_arguments(parser *p, int function)
 {
     const int expected = functions[function].operands;
     int found = 0;
@@ -224,18 +226,18 @@ static bool parse_operands(parser *p, int function)
         if (!parse_sum(p)) return false;
         found++;
     } while (accept_character(p, ','));
-    if (!accept_character(p, ')')) return fail_expecting(p, "an operator, a comma or )");
+    if (!accept_character(p, ')')) return record_unexpected_text(p, "an operator, a comma or )");
     if (found != expected) return fail(p, "%s has %d operands, expected %d", functions[function].name, found, expected);
-    if (functions[function].operation == SCENE_OP_POWER) return add_power(p);
+    if (functions[function].operation == SCENE_OP_POWER) return add_power_instruction(p);
     return expected == 2 ? add_operator_instruction(p, functions[function].operation)
                          : add_instruction(p, functions[function].operation, 0, 0);
 }
 
-static bool fail_for_function(parser *p, const char *name)
+static bool fail_for_unknown_function(parser *p, const char *name)
 {
     const char *names[FUNCTIONS + 1] = {"mag"};
     for (int i = 0; i < FUNCTIONS; i++) names[i + 1] = functions[i].name;
-    const char *meant = scene_nearest_word(name, names, FUNCTIONS + 1);
+    const char *meant = scene_find_most_similar_word(name, names, FUNCTIONS + 1);
     if (strcmp(name, "magnitude") == 0) meant = "mag";
     return fail(p, "\"%.60s\" is no function%s%s%s, expected " FUNCTION_WORDS, name, meant ? " (did you mean " : "",
                 meant ? meant : "", meant ? "?)" : "");
@@ -245,12 +247,12 @@ static bool parse_function(parser *p, const char *name)
 {
     int function = 0;
     while (function < FUNCTIONS && strcmp(functions[function].name, name) != 0) function++;
-    if (strcmp(name, "mag") == 0) return parse_magnitude(p);
-    if (function == FUNCTIONS) return fail_for_function(p, name);
-    return parse_operands(p, function);
+    if (strcmp(name, "mag") == 0) return parse_argument_of_magnitude(p);
+    if (function == FUNCTIONS) return fail_for_unknown_function(p, name);
+    return parse_function_arguments(p, function);
 }
 
-static bool parse_field(parser *p)
+static bool parse_field_or_function(parser *p)
 {
     char name[NAME_SIZE];
     const bool is_quoted = !is_letter(*p->cursor);
@@ -261,7 +263,7 @@ static bool parse_field(parser *p)
         p->cursor++;
         if (!parse_component(p, name, &component)) return false;
     }
-    return push_input(p, name, component);
+    return add_push_input_instruction(p, name, component);
 }
 
 /* ---- parsing the rules of the grammar --------------------------------------------------------------------------- */
@@ -285,17 +287,17 @@ static bool parse_number(parser *p)
     const double number = strtod(digits, NULL);
     if (!isfinite(number)) return fail(p, "the number %s is too large, expected one below 1.8e308", digits);
     p->cursor = end;
-    return push_operand(p, SCENE_OP_PUSH_NUMBER, 0, number);
+    return add_push_instruction(p, SCENE_OP_PUSH_NUMBER, 0, number);
 }
 
 static bool parse_primary(parser *p)
 {
-    const char c = peek_character(p);
+    const char c = skip_blanks_and_peek(p);
     if (is_digit(c) || (c == '.' && is_digit(p->cursor[1]))) return parse_number(p);
-    if (is_name(c)) return parse_field(p);
-    if (!accept_character(p, '(')) return fail_expecting(p, "a number, a field or (");
+    if (is_start_of_name(c)) return parse_field_or_function(p);
+    if (!accept_character(p, '(')) return record_unexpected_text(p, "a number, a field or (");
     if (!parse_sum(p)) return false;
-    return accept_character(p, ')') || fail_expecting(p, "an operator or )");
+    return accept_character(p, ')') || record_unexpected_text(p, "an operator or )");
 }
 
 static bool parse_sign(parser *p);
@@ -314,13 +316,14 @@ static bool parse_power(parser *p)
         p->expression->count--;
         p->expression->instructions[before].number *= -1;
     }
-    return add_power(p);
+    return add_power_instruction(p);
 }
 
 static bool parse_sign(parser *p)
 {
     bool is_negative = false;
-    for (; peek_character(p) == '-' || *p->cursor == '+'; p->cursor++) is_negative = is_negative != (*p->cursor == '-');
+    for (; skip_blanks_and_peek(p) == '-' || *p->cursor == '+'; p->cursor++)
+        is_negative = is_negative != (*p->cursor == '-');
     if (p->nesting_depth++ > MOST_NESTED)
         return fail(p, "more than %d brackets and functions are nested, expected fewer", MOST_NESTED);
     if (!parse_power(p)) return false;
@@ -331,7 +334,7 @@ static bool parse_sign(parser *p)
 static bool parse_product(parser *p)
 {
     if (!parse_sign(p)) return false;
-    while (peek_character(p) == '*' || *p->cursor == '/') {
+    while (skip_blanks_and_peek(p) == '*' || *p->cursor == '/') {
         const scene_operation operation = *p->cursor++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
         if (!parse_sign(p) || !add_operator_instruction(p, operation)) return false;
     }
@@ -341,7 +344,7 @@ static bool parse_product(parser *p)
 static bool parse_sum(parser *p)
 {
     if (!parse_product(p)) return false;
-    while (peek_character(p) == '+' || *p->cursor == '-') {
+    while (skip_blanks_and_peek(p) == '+' || *p->cursor == '-') {
         const scene_operation operation = *p->cursor++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
         if (!parse_product(p) || !add_operator_instruction(p, operation)) return false;
     }
@@ -354,8 +357,8 @@ scene_parse_result scene_parse_expression(const char *text, scene_expression *ou
     *out = (scene_expression){0};
     if (strlen(text) > SCENE_EXPRESSION_BYTES)
         fail(&p, "an expression of %zu bytes stands there, expected at most %d", strlen(text), SCENE_EXPRESSION_BYTES);
-    else if (parse_sum(&p) && peek_character(&p) != '\0')
-        fail_expecting(&p, "an operator (+ - * / ^) or the end");
+    else if (parse_sum(&p) && skip_blanks_and_peek(&p) != '\0')
+        record_unexpected_text(&p, "an operator (+ - * / ^) or the end");
     if (p.result != SCENE_PARSED) scene_expression_free(out);
     return p.result;
 }
@@ -381,7 +384,7 @@ static double compute_integer_power(double base, int exponent)
     return exponent < 0 ? 1 / power : power;
 }
 
-static void raise_to_integer(double *restrict a, int exponent, int count)
+static void raise_values_to_integer_power(double *restrict a, int exponent, int count)
 {
     if (exponent == 2)
         FOR_EACH(a[i] *= a[i]);
@@ -389,7 +392,7 @@ static void raise_to_integer(double *restrict a, int exponent, int count)
         FOR_EACH(a[i] = compute_integer_power(a[i], exponent));
 }
 
-static void apply_function(scene_operation operation, double *restrict a, int count)
+static void apply_function_to_array(scene_operation operation, double *restrict a, int count)
 {
     switch (operation) {
     case SCENE_OP_NEGATE: FOR_EACH(a[i] = -a[i]); break;
@@ -406,7 +409,7 @@ static void apply_function(scene_operation operation, double *restrict a, int co
 
 /* Applies the operator to `count` pairs of numbers a and b, and stores the results in a. If one number is NaN, the
  * minimum and the maximum are NaN. */
-static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
+static void apply_operator_to_arrays(scene_operation operation, double *restrict a, const double *restrict b, int count)
 {
     switch (operation) {
     case SCENE_OP_ADD: FOR_EACH(a[i] += b[i]); break;
@@ -419,13 +422,14 @@ static void apply_operator(scene_operation operation, double *restrict a, const 
     }
 }
 
-static bool is_operator(scene_operation operation)
+static bool is_binary_operation(scene_operation operation)
 {
     return (operation >= SCENE_OP_ADD && operation <= SCENE_OP_POWER) || operation == SCENE_OP_MIN ||
            operation == SCENE_OP_MAX;
 }
 
-void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack)
+void scene_evaluate_expression(const scene_expression *expression, const double *const *inputs, int count,
+                               double *stack)
 {
     double *top = stack - SCENE_BLOCK; /* top entry of the stack; an entry is a block of SCENE_BLOCK numbers */
     for (int k = 0; k < expression->count; k++) {
@@ -437,12 +441,12 @@ void scene_evaluate(const scene_expression *expression, const double *const *inp
             top += SCENE_BLOCK;
             memcpy(top, inputs[at->input], (size_t)count * sizeof *top);
         } else if (at->operation == SCENE_OP_WHOLE_POWER) {
-            raise_to_integer(top, (int)at->number, count);
-        } else if (is_operator(at->operation)) {
+            raise_values_to_integer_power(top, (int)at->number, count);
+        } else if (is_binary_operation(at->operation)) {
             top -= SCENE_BLOCK;
-            apply_operator(at->operation, top, top + SCENE_BLOCK, count);
+            apply_operator_to_arrays(at->operation, top, top + SCENE_BLOCK, count);
         } else {
-            apply_function(at->operation, top, count);
+            apply_function_to_array(at->operation, top, count);
         }
     }
 }

@@ -65,6 +65,7 @@ void scene_expression_free(scene_expression *expression);
 
 /* Runs the program for `count` points, at most SCENE_BLOCK. inputs: for each input, an array of `count` values. stack:
  * space for depth × SCENE_BLOCK numbers; its first `count` numbers receive the results. */
-void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack);
+void scene_evaluate_expression(const scene_expression *expression, const double *const *inputs, int count,
+                               double *stack);
 
 #endif

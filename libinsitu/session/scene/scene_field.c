@@ -32,7 +32,7 @@ insitu_status scene_convert_component(const scene_document *d, const char *path,
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count)
 {
     const char *texts[SCENE_MAX_NAMES];
-    const int count = path ? scene_document_texts(d, path, texts, SCENE_MAX_NAMES) : 0;
+    const int count = path ? scene_list_texts_at_path(d, path, texts, SCENE_MAX_NAMES) : 0;
     *out = base_calloc((size_t)count, sizeof **out);
     if (!*out) return scene_fail_for_memory(d);
     while (*out_count < count) {
@@ -43,11 +43,11 @@ insitu_status scene_copy_texts(const scene_document *d, const char *path, char *
     return INSITU_OK;
 }
 
-insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out)
+insitu_status scene_convert_mesh_names(const scene_document *d, const char *layer, scene_field *out)
 {
     char path[SCENE_PATH_SIZE + 8];
     snprintf(path, sizeof path, "%s.mesh", layer);
-    out->meshes_line = scene_document_line(d, path);
+    out->meshes_line = scene_get_line_number_at_path(d, path);
     return scene_copy_texts(d, path, &out->meshes, &out->mesh_count);
 }
 
@@ -56,10 +56,10 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
 {
     char field_path[SCENE_PATH_SIZE + 8];
     snprintf(field_path, sizeof field_path, "%s.field", path);
-    out->line = scene_document_line(d, field_path);
+    out->line = scene_get_line_number_at_path(d, field_path);
     out->name = base_strdup(name);
     if (!out->name) return scene_fail_for_memory(d);
-    const insitu_status status = scene_convert_meshes(d, layer, out);
+    const insitu_status status = scene_convert_mesh_names(d, layer, out);
     return status ? status : scene_convert_component(d, path, component, &out->component);
 }
 
@@ -83,7 +83,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 /* ---- iteration over the fields of an image's layers -------------------------------------------------------------- */
 
 /* Returns the contour lines of a layer; NULL for a volume, because volumes have none. */
-static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)
+static scene_lines *find_contour_lines_of_layer(const scene_image *image, scene_layer_kind kind, int layer)
 {
     switch (kind) {
     case SCENE_ISOSURFACE: return &image->isosurfaces[layer].lines;
@@ -94,11 +94,11 @@ static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind 
 }
 
 /* Returns the field that the layer uses in this role (scene_field_role); NULL if it uses none. */
-static scene_field *find_role_field(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
+static scene_field *get_field_of_role(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
 {
     scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;
     scene_surface *surface = kind == SCENE_SURFACE ? &image->surfaces[layer] : NULL;
-    scene_lines *lines = role == SCENE_LINES ? find_layer_lines(image, kind, layer) : NULL;
+    scene_lines *lines = role == SCENE_LINES ? find_contour_lines_of_layer(image, kind, layer) : NULL;
     if (role == SCENE_LINES) return lines && lines->is_given ? &lines->field : NULL;
     if (role == SCENE_THRESHOLD) return surface && surface->threshold.is_given ? &surface->threshold.field : NULL;
     if (surface) return role == SCENE_COLOURS && surface->has_colour_by ? &surface->colour_by : NULL;
@@ -107,7 +107,7 @@ static scene_field *find_role_field(const scene_image *image, scene_layer_kind k
     return kind == SCENE_VOLUME ? &image->volumes[layer].field : &image->slices[layer].field;
 }
 
-scene_field *scene_next_field(scene_field_walk *walk)
+scene_field *scene_find_next_field_of_layers(scene_field_walk *walk)
 {
     enum { KINDS = SCENE_SURFACE + 1, ROLES = SCENE_THRESHOLD + 1 };
     const scene_image *image = walk->image;
@@ -118,7 +118,7 @@ scene_field *scene_next_field(scene_field_walk *walk)
         if (kind == KINDS) return NULL;
         walk->kind = (scene_layer_kind)kind;
         walk->role = (scene_field_role)(walk->position++ % ROLES);
-        scene_field *field = find_role_field(image, walk->kind, layer, walk->role);
+        scene_field *field = get_field_of_role(image, walk->kind, layer, walk->role);
         if (field) return field;
     }
 }
@@ -131,7 +131,7 @@ const char *scene_get_layer_word(scene_layer_kind kind)
 
 /* ---- materials --------------------------------------------------------------------------------------------------- */
 
-static float value_or_default(const double *given, float otherwise)
+static float get_value_or_default(const double *given, float otherwise)
 {
     return given ? (float)*given : otherwise;
 }
@@ -140,6 +140,6 @@ scene_material scene_convert_material(const scene_file_material *in)
 {
     static const scene_file_material none;
     if (!in) in = &none;
-    return (scene_material){value_or_default(in->ambient, 0.15F), value_or_default(in->diffuse, 0.75F),
-                            value_or_default(in->specular, 0.25F), value_or_default(in->shininess, 32)};
+    return (scene_material){get_value_or_default(in->ambient, 0.15F), get_value_or_default(in->diffuse, 0.75F),
+                            get_value_or_default(in->specular, 0.25F), get_value_or_default(in->shininess, 32)};
 }

@@ -17,8 +17,8 @@ static const float cycle[cycle_length][3] = {
     {0.55F, 0.40F, 0.30F}, {0.65F, 0.85F, 0.45F}, {0.25F, 0.35F, 0.60F}, {0.95F, 0.78F, 0.65F},
     {0.15F, 0.50F, 0.30F}, {0.75F, 0.70F, 0.85F}, {0.60F, 0.20F, 0.40F}, {0.75F, 0.75F, 0.75F}};
 
-static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_isosurface *in,
-                                    scene_isosurface *out)
+static insitu_status check_and_store_isovalues(const scene_document *d, const char *path,
+                                               const scene_file_isosurface *in, scene_isosurface *out)
 {
     for (int i = 0; i < in->values_count; i++) {
         for (int j = 0; j < i; j++) {
@@ -37,8 +37,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 
 /* Converts the colours of an isosurface layer. first: number of isovalues of earlier layers. Default colours continue
  * the cycle after this number, so that layers have different colours. */
-static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
-                                     int first, scene_isosurface *out)
+static insitu_status convert_isosurface_colours(const scene_document *d, const char *path,
+                                                const scene_file_isosurface *in, int first, scene_isosurface *out)
 {
     if (in->colours && in->colour_by) {
         return scene_fail_at_key(d, path, "colours", "given beside colour_by, expected one of the two");
@@ -74,8 +74,8 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
             "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
             "surface in it");
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
-    if (status == INSITU_OK) status = convert_values(d, path, in, out);
-    if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
+    if (status == INSITU_OK) status = check_and_store_isovalues(d, path, in, out);
+    if (status == INSITU_OK) status = convert_isosurface_colours(d, path, in, first_value, out);
     out->has_colour_by = in->colour_by != NULL;
     if (status == INSITU_OK && in->colour_by)
         status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
@@ -83,8 +83,8 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     return scene_convert_lines(d, path, in->lines, in->colour_by ? &out->colour_by : NULL, height, &out->lines);
 }
 
-static insitu_status convert_opacity(const scene_document *d, const char *path, const scene_file_volume *in,
-                                     scene_volume *out)
+static insitu_status convert_opacity_points(const scene_document *d, const char *path, const scene_file_volume *in,
+                                            scene_volume *out)
 {
     static const double ramp[2][2] = {{0, 0}, {1, 0.9}};
     const int count = in->opacity ? in->opacity_count : 2;
@@ -115,7 +115,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
     out->field.at_vertices = out->field.joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
-    if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
+    if (status == INSITU_OK) status = convert_opacity_points(d, path, in, out);
     return status;
 }
 
@@ -124,8 +124,8 @@ typedef struct layer_counts {
     int values; /* number of isovalues, planes and outer surfaces, counted together */
 } layer_counts;
 
-static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
-                                 const scene_file_layer *layer, layer_counts *counts)
+static insitu_status check_and_count_layer(const scene_document *d, const char *path, const char *key,
+                                           const scene_file_layer *layer, layer_counts *counts)
 {
     const int kinds = !!layer->isosurface + !!layer->volume + !!layer->slice + !!layer->surface;
     if (kinds != 1)
@@ -157,12 +157,12 @@ static insitu_status count_layers(const scene_document *d, const char *path, con
     for (int i = 0; i < in->layers_count && !status; i++) {
         char key[32];
         snprintf(key, sizeof key, "layers[%d]", i);
-        status = count_layer(d, path, key, &in->layers[i], counts);
+        status = check_and_count_layer(d, path, key, &in->layers[i], counts);
     }
     return status;
 }
 
-static const char *get_file_layer_word(const scene_file_layer *layer)
+static const char *get_layer_kind_name(const scene_file_layer *layer)
 {
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
@@ -188,7 +188,7 @@ static insitu_status convert_layer_clip(const scene_document *d, const char *pat
 
 /* Stores the index of a layer in the image's list of layers. The layer must be the most recently converted one among
  * the image's layers of its type (isosurface, volume, slice or surface). */
-static void set_layer_number(const scene_file_layer *in, int number, scene_image *out)
+static void set_layer_index(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
     if (in->surface) out->surfaces[out->surface_count - 1].number = number;
@@ -222,10 +222,10 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
         const scene_file_layer *layer = &in->layers[i];
         /* shorter than SCENE_PATH_SIZE, so that keys of the layer can be appended */
         char layer_path[SCENE_PATH_SIZE - 16];
-        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, get_file_layer_word(layer));
+        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, get_layer_kind_name(layer));
         status = convert_layer(d, layer_path, layer, values, out);
         if (!status) status = convert_layer_clip(d, layer_path, layer, out);
-        if (!status) set_layer_number(layer, i, out);
+        if (!status) set_layer_index(layer, i, out);
         values += layer->isosurface ? layer->isosurface->values_count : 0;
     }
     return status;

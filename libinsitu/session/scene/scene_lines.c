@@ -14,8 +14,8 @@ static int compare_values(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_lines *in,
-                                    scene_lines *out)
+static insitu_status check_and_sort_contour_values(const scene_document *d, const char *path,
+                                                   const scene_file_lines *in, scene_lines *out)
 {
     if (in->values && in->count)
         return scene_fail_at_key(d, path, "count", "given beside values, expected one of the two");
@@ -38,9 +38,9 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 
 /* Sets the field of contour lines if the scene gives none: the lines are contours of the field that colours the layer.
  */
-static insitu_status use_field_that_colours_layer(const scene_document *d, const char *layer, const char *path,
-                                                  const scene_file_lines *in, const scene_field *colours,
-                                                  scene_lines *out)
+static insitu_status set_contour_field_to_colour_field(const scene_document *d, const char *layer, const char *path,
+                                                       const scene_file_lines *in, const scene_field *colours,
+                                                       scene_lines *out)
 {
     if (in->component) return scene_fail_at_key(d, path, "component", "given without field, expected both");
     if (!colours)
@@ -49,10 +49,10 @@ static insitu_status use_field_that_colours_layer(const scene_document *d, const
     out->field.line = colours->line;
     out->field.component = colours->component;
     out->field.name = base_strdup(colours->name);
-    return out->field.name ? scene_convert_meshes(d, layer, &out->field) : scene_fail_for_memory(d);
+    return out->field.name ? scene_convert_mesh_names(d, layer, &out->field) : scene_fail_for_memory(d);
 }
 
-float scene_default_line_width(int height)
+float scene_get_default_line_width(int height)
 {
     return fmaxf(1.5F, (float)height / 600);
 }
@@ -64,13 +64,13 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
     if (!in) return INSITU_OK;
     snprintf(path, sizeof path, "%s.lines", layer);
     out->is_given = true;
-    out->width = in->width ? (float)*in->width : scene_default_line_width(height);
+    out->width = in->width ? (float)*in->width : scene_get_default_line_width(height);
     for (int i = 0; i < 3 * SCENE_MAX_LINES; i++)
         out->colours[i] = colour_linear_from_srgb(in->colour ? (float)in->colour[i % 3] : 0.1F);
     out->field.at_vertices = true;
     out->field.joins_corners = colours && colours->joins_corners;
-    const insitu_status status = convert_values(d, path, in, out);
+    const insitu_status status = check_and_sort_contour_values(d, path, in, out);
     if (status) return status;
-    if (!in->field) return use_field_that_colours_layer(d, layer, path, in, colours, out);
+    if (!in->field) return set_contour_field_to_colour_field(d, layer, path, in, colours, out);
     return scene_convert_field(d, layer, path, in->field, in->component, &out->field);
 }

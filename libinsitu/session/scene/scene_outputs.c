@@ -78,7 +78,7 @@ static placeholder parse_placeholder(const char *text)
 
 /* Writes a number and returns its length. default_digits: number of significant digits if the placeholder does not set
  * any. */
-static int write_number(const placeholder *p, double value, int default_digits, char *out, size_t size)
+static int format_number_of_placeholder(const placeholder *p, double value, int default_digits, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
     if (p->conversion == 'e') return snprintf(out, size, "%.*e", p->digits, value);
@@ -87,7 +87,8 @@ static int write_number(const placeholder *p, double value, int default_digits, 
 
 /* Writes the placeholder's value to `out`, which has space for `size` bytes, and returns its length. If `out` is NULL
  * and `size` is 0, only the length is computed. */
-static int write_value(const placeholder *p, const scene_placeholder_values *moment, char *out, size_t size)
+static int format_placeholder_value(const placeholder *p, const scene_placeholder_values *moment, char *out,
+                                    size_t size)
 {
     switch (p->kind) {
     case PLACEHOLDER_CYCLE: return snprintf(out, size, "%0*lld", p->digits, moment->cycle);
@@ -95,8 +96,8 @@ static int write_value(const placeholder *p, const scene_placeholder_values *mom
     case PLACEHOLDER_PLANE: return snprintf(out, size, "%0*d", p->digits, moment->plane);
     case PLACEHOLDER_NAME: return snprintf(out, size, "%s", moment->name);
     case PLACEHOLDER_FIELD: return snprintf(out, size, "%s", moment->field ? moment->field : "");
-    case PLACEHOLDER_ISOVALUE: return write_number(p, moment->isovalue, 9, out, size);
-    default: return write_number(p, moment->time, 6, out, size);
+    case PLACEHOLDER_ISOVALUE: return format_number_of_placeholder(p, moment->isovalue, 9, out, size);
+    default: return format_number_of_placeholder(p, moment->time, 6, out, size);
     }
 }
 
@@ -110,7 +111,7 @@ static size_t expand_pattern(const char *pattern, const scene_placeholder_values
         char *at = out ? out + length : NULL;
         int written = 1;
         if (p.kind != PLACEHOLDER_NONE)
-            written = write_value(&p, moment, at, out ? size - length : 0);
+            written = format_placeholder_value(&p, moment, at, out ? size - length : 0);
         else if (out)
             *at = *pattern;
         length += (size_t)written;
@@ -120,7 +121,7 @@ static size_t expand_pattern(const char *pattern, const scene_placeholder_values
     return length;
 }
 
-char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
+char *scene_expand_placeholders(const char *pattern, const scene_placeholder_values *moment)
 {
     c_locale numbers;
     if (!c_locale_enter(&numbers)) return NULL;
@@ -134,7 +135,7 @@ char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
 /* Some placeholders may be used only if the image has a certain key; {view}, for example, needs camera.orbit. Returns a
  * description of the key that the placeholder needs if the image lacks this key; otherwise NULL. image: path of the
  * image in the file. */
-static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
+static const char *find_key_required_by_placeholder(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
         placeholder_kind kind;
@@ -146,7 +147,7 @@ static const char *find_missing_key(const scene_document *d, const char *image, 
     for (size_t i = 0; i < sizeof needs / sizeof *needs; i++) {
         char key[SCENE_PATH_SIZE + 32];
         snprintf(key, sizeof key, "%s.%s", image, needs[i].key);
-        if (kind == needs[i].kind && scene_document_kind(d, key) == SCENE_NOTHING) return needs[i].lack;
+        if (kind == needs[i].kind && scene_get_node_type_at_path(d, key) == SCENE_NOTHING) return needs[i].lack;
     }
     return NULL;
 }
@@ -165,14 +166,14 @@ insitu_status scene_check_placeholders(const scene_document *d, const char *path
                 length, open);
         char image[SCENE_PATH_SIZE];
         snprintf(image, sizeof image, "%.*s", (int)strcspn(path, "."), path);
-        const char *lack = find_missing_key(d, image, kind);
+        const char *lack = find_key_required_by_placeholder(d, image, kind);
         if (lack) return scene_fail_at_key(d, path, key, "\"%.*s\" is of images with %s alone", length, open, lack);
     }
     return INSITU_OK;
 }
 
-static insitu_status convert_format(const scene_document *d, const char *path, const scene_file_output *in,
-                                    scene_format *format)
+static insitu_status determine_file_format(const scene_document *d, const char *path, const scene_file_output *in,
+                                           scene_format *format)
 {
     if (!in->path && !in->cinema)
         return scene_fail_at_key(d, path, "path", "missing, expected a file's name, or cinema: and that of a database");
@@ -192,8 +193,8 @@ static insitu_status convert_format(const scene_document *d, const char *path, c
                                    : scene_fail_at_key(d, path, "bits", "%d is not allowed, expected 8 or 16", bits);
 }
 
-static insitu_status convert_deep(const scene_document *d, const char *path, const scene_file_output *in,
-                                  scene_output *out)
+static insitu_status check_and_set_deep_output(const scene_document *d, const char *path, const scene_file_output *in,
+                                               scene_output *out)
 {
     out->is_deep = in->deep && *in->deep;
     if (!out->is_deep) return INSITU_OK;
@@ -206,8 +207,8 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
 }
 
 /* Converts the keys that combine several pictures in one file (montages and insets). */
-static insitu_status convert_montage_keys(const scene_document *d, const char *path, const scene_file_output *in,
-                                          scene_output *out)
+static insitu_status convert_montage_settings(const scene_document *d, const char *path, const scene_file_output *in,
+                                              scene_output *out)
 {
     const char *key = in->inset ? "inset" : "grid";
     out->montage = -1;
@@ -229,14 +230,14 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
                                     const scene_image *image, scene_output *out)
 {
     out->database = -1;
-    insitu_status status = convert_format(d, path, in, &out->format);
+    insitu_status status = determine_file_format(d, path, in, &out->format);
     if (!status && in->path) status = scene_check_placeholders(d, path, "path", in->path);
     if (status) return status;
     out->has_data = in->data && *in->data;
     if (out->has_data && out->format != SCENE_EXR)
         return scene_fail_at_key(d, path, "data", "given for a PNG, expected for an EXR only");
-    status = convert_deep(d, path, in, out);
-    if (!status) status = convert_montage_keys(d, path, in, out);
+    status = check_and_set_deep_output(d, path, in, out);
+    if (!status) status = convert_montage_settings(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (out->shares_bars && !(out->has_decorations && image->decorations.has_bars))
@@ -283,7 +284,7 @@ typedef struct written_file {
     int image, output, output_index;
 } written_file;
 
-static int compare_files(const void *a, const void *b)
+static int compare_output_paths(const void *a, const void *b)
 {
     const written_file *first = a, *second = b;
     const int order = strcmp(first->path, second->path);
@@ -291,15 +292,15 @@ static int compare_files(const void *a, const void *b)
 }
 
 /* Returns the name of a placeholder that would make the paths of these two pictures of an image differ. */
-static const char *find_missing_placeholder(const scene_variant *a, const scene_variant *b)
+static const char *find_distinguishing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
     if (a->plane != b->plane) return "plane";
     return a->isovalue != b->isovalue ? "isovalue" : "field";
 }
 
-static insitu_status fail_for_repeated_file(const scene_document *d, const scene *s, const written_file *first,
-                                            const written_file *second)
+static insitu_status report_repeated_output_file(const scene_document *d, const scene *s, const written_file *first,
+                                                 const written_file *second)
 {
     const scene_variant *a = &s->images[first->image].variant, *b = &s->images[second->image].variant;
     const scene_output *output = &s->images[second->image].outputs[second->output];
@@ -308,12 +309,12 @@ static insitu_status fail_for_repeated_file(const scene_document *d, const scene
     snprintf(path, sizeof path, "images[%d].outputs[%d]", b->source, second->output);
     if (a->source != b->source || first->output != second->output)
         return scene_fail_at_key(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
-    const char *word = find_missing_placeholder(a, b);
+    const char *word = find_distinguishing_placeholder(a, b);
     return scene_fail_at_key(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern,
                              word, word);
 }
 
-static const scene_output *find_output(const scene *s, const written_file *file)
+static const scene_output *get_output_of_file(const scene *s, const written_file *file)
 {
     return &s->images[file->image].outputs[file->output];
 }
@@ -326,13 +327,14 @@ static insitu_status check_files_are_distinct(const scene_document *d, const sce
     int found = -1;
     for (int i = 1; i < count; i++) {
         if (strcmp(files[i - 1].path, files[i].path) != 0) continue;
-        if (find_output(s, &files[i - 1])->montage >= 0 && find_output(s, &files[i])->montage >= 0) continue;
+        if (get_output_of_file(s, &files[i - 1])->montage >= 0 && get_output_of_file(s, &files[i])->montage >= 0)
+            continue;
         if (found < 0 || files[i].output_index < files[found].output_index) found = i;
     }
-    return found < 0 ? INSITU_OK : fail_for_repeated_file(d, s, &files[found - 1], &files[found]);
+    return found < 0 ? INSITU_OK : report_repeated_output_file(d, s, &files[found - 1], &files[found]);
 }
 
-insitu_status scene_check_outputs(const scene_document *d, const scene *s)
+insitu_status scene_check_output_paths_differ(const scene_document *d, const scene *s)
 {
     size_t total = 0;
     for (int i = 0; i < s->image_count; i++) total += (size_t)s->images[i].output_count;
@@ -343,12 +345,13 @@ insitu_status scene_check_outputs(const scene_document *d, const scene *s)
     for (int i = 0; i < s->image_count && !status; i++) {
         const scene_placeholder_values moment = scene_make_placeholder_values(&s->images[i], sample_cycle, sample_time);
         for (int o = 0; o < s->images[i].output_count && !status; o++) {
-            files[count] = (written_file){scene_expand(s->images[i].outputs[o].path, &moment), i, o, count};
+            files[count] =
+                (written_file){scene_expand_placeholders(s->images[i].outputs[o].path, &moment), i, o, count};
             if (files[count++].path == NULL) status = scene_fail_for_memory(d);
         }
     }
     if (!status) {
-        qsort(files, (size_t)count, sizeof *files, compare_files);
+        qsort(files, (size_t)count, sizeof *files, compare_output_paths);
         status = check_files_are_distinct(d, s, files, count);
     }
     for (int i = 0; i < count; i++) base_free(files[i].path);

@@ -336,7 +336,7 @@ enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 /* Maximum number of bytes of a name, of names in a list or mapping, and of bytes of a key that the scene defines.
  * libcyaml has no type for three kinds of values: a name or a list of names, a value of several forms, and a mapping
  * whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the document
- * (scene_document_texts(), scene_document_kind(), scene_document_names()). */
+ * (scene_list_texts_at_path(), scene_get_node_type_at_path(), scene_list_keys_at_path()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
 /* scene_top: the top-level mapping of a file, which is read into a scene_file; scene_top_value: the same mapping as a

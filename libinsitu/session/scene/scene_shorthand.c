@@ -22,7 +22,7 @@ static yaml_node_t *find_node_by_index(const rewrite *r, int number)
     return yaml_document_get_node(r->document, number);
 }
 
-static const char *node_text(const rewrite *r, int number)
+static const char *get_scalar_text_or_null(const rewrite *r, int number)
 {
     const yaml_node_t *node = find_node_by_index(r, number);
     return node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
@@ -30,7 +30,7 @@ static const char *node_text(const rewrite *r, int number)
 
 /* ---- new nodes: each function returns the index of the node, or 0 if memory ran out ------------------------------ */
 
-static int finish_new_node(rewrite *r, int number)
+static int check_new_node_and_set_line(rewrite *r, int number)
 {
     if (number)
         find_node_by_index(r, number)->start_mark = r->mark;
@@ -39,20 +39,20 @@ static int finish_new_node(rewrite *r, int number)
     return number;
 }
 
-static int make_text(rewrite *r, const char *text)
+static int create_scalar_node(rewrite *r, const char *text)
 {
-    return finish_new_node(r, yaml_document_add_scalar(r->document, NULL, (const yaml_char_t *)text, (int)strlen(text),
-                                                       YAML_PLAIN_SCALAR_STYLE));
+    return check_new_node_and_set_line(r, yaml_document_add_scalar(r->document, NULL, (const yaml_char_t *)text,
+                                                                   (int)strlen(text), YAML_PLAIN_SCALAR_STYLE));
 }
 
-static int make_list(rewrite *r)
+static int create_list_node(rewrite *r)
 {
-    return finish_new_node(r, yaml_document_add_sequence(r->document, NULL, YAML_FLOW_SEQUENCE_STYLE));
+    return check_new_node_and_set_line(r, yaml_document_add_sequence(r->document, NULL, YAML_FLOW_SEQUENCE_STYLE));
 }
 
-static int make_mapping(rewrite *r)
+static int create_mapping_node(rewrite *r)
 {
-    return finish_new_node(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
+    return check_new_node_and_set_line(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
 }
 
 static void append_item(rewrite *r, int list, int item)
@@ -62,38 +62,38 @@ static void append_item(rewrite *r, int list, int item)
 
 static void append_pair(rewrite *r, int mapping, const char *key, int value)
 {
-    const int name = make_text(r, key);
+    const int name = create_scalar_node(r, key);
     if (!mapping || !name || !value || !yaml_document_append_mapping_pair(r->document, mapping, name, value))
         r->has_memory = false;
 }
 
-static int make_vector(rewrite *r, const double v[3])
+static int create_vector_node(rewrite *r, const double v[3])
 {
-    const int list = make_list(r);
+    const int list = create_list_node(r);
     for (int i = 0; i < 3; i++) {
         char text[32];
         snprintf(text, sizeof text, "%.17g", v[i]);
-        append_item(r, list, make_text(r, text));
+        append_item(r, list, create_scalar_node(r, text));
     }
     return list;
 }
 
-static int make_list_of(rewrite *r, int item)
+static int create_list_with_item(rewrite *r, int item)
 {
-    const int list = make_list(r);
+    const int list = create_list_node(r);
     append_item(r, list, item);
     return list;
 }
 
 /* ---- colours and axes ------------------------------------------------------------------------------------------- */
 
-static int compare_name(const void *name, const void *entry)
+static int compare_with_colour_name(const void *name, const void *entry)
 {
     return strcmp(name, ((const scene_colour_name *)entry)->name);
 }
 
 /* Reads a colour given as "#rrggbb" or by name. */
-static bool read_colour(const char *text, double colour[3])
+static bool parse_colour(const char *text, double colour[3])
 {
     unsigned long rgb;
     if (text[0] == '#') {
@@ -102,7 +102,7 @@ static bool read_colour(const char *text, double colour[3])
     } else {
         const scene_colour_name *named =
             bsearch(text, scene_colour_names, sizeof scene_colour_names / sizeof *scene_colour_names,
-                    sizeof *scene_colour_names, compare_name);
+                    sizeof *scene_colour_names, compare_with_colour_name);
         if (!named) return false;
         rgb = named->rgb;
     }
@@ -111,7 +111,7 @@ static bool read_colour(const char *text, double colour[3])
 }
 
 /* Reads an axis such as "x", "+y" or "-z" as a vector. */
-static bool read_axis(const char *text, double axis[3])
+static bool parse_axis(const char *text, double axis[3])
 {
     const double sign = *text == '-' ? -1 : 1;
     text += *text == '-' || *text == '+';
@@ -123,16 +123,16 @@ static bool read_axis(const char *text, double axis[3])
 static void expand_colour(rewrite *r, int *value)
 {
     double colour[3];
-    const char *text = node_text(r, *value);
-    if (text && read_colour(text, colour)) *value = make_vector(r, colour);
+    const char *text = get_scalar_text_or_null(r, *value);
+    if (text && parse_colour(text, colour)) *value = create_vector_node(r, colour);
 }
 
 /* Expands a list of colours, or a single colour. */
 static void expand_colours(rewrite *r, int *value)
 {
     double colour[3];
-    const char *text = node_text(r, *value);
-    if (text && read_colour(text, colour)) *value = make_list_of(r, make_vector(r, colour));
+    const char *text = get_scalar_text_or_null(r, *value);
+    if (text && parse_colour(text, colour)) *value = create_list_with_item(r, create_vector_node(r, colour));
     if (text || find_node_by_index(r, *value)->type != YAML_SEQUENCE_NODE) return;
     yaml_node_item_t *items = find_node_by_index(r, *value)->data.sequence.items.start;
     const yaml_node_item_t *end = find_node_by_index(r, *value)->data.sequence.items.top;
@@ -142,86 +142,87 @@ static void expand_colours(rewrite *r, int *value)
 static void expand_axis(rewrite *r, int *value)
 {
     double axis[3];
-    const char *text = node_text(r, *value);
-    if (text && read_axis(text, axis)) *value = make_vector(r, axis);
+    const char *text = get_scalar_text_or_null(r, *value);
+    if (text && parse_axis(text, axis)) *value = create_vector_node(r, axis);
 }
 
 /* ---- texts, lists, switches and names --------------------------------------------------------------------------- */
 
 /* Expands a text to a mapping in which the text is the value of the key. */
-static void expand_text(rewrite *r, const char *key, int *value)
+static void expand_text_to_mapping(rewrite *r, const char *key, int *value)
 {
     const int text = *value;
-    if (!node_text(r, text) || !*node_text(r, text)) return;
-    *value = make_mapping(r);
+    if (!get_scalar_text_or_null(r, text) || !*get_scalar_text_or_null(r, text)) return;
+    *value = create_mapping_node(r);
     append_pair(r, *value, key, text);
 }
 
 static void expand_field(rewrite *r, int *value)
 {
-    expand_text(r, "field", value);
+    expand_text_to_mapping(r, "field", value);
 }
 
 /* Expands a path, a mapping, or a list of either, to a list of mappings. */
 static void expand_outputs(rewrite *r, int *value)
 {
-    expand_text(r, "path", value);
-    if (r->has_memory && find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+    expand_text_to_mapping(r, "path", value);
+    if (r->has_memory && find_node_by_index(r, *value)->type == YAML_MAPPING_NODE)
+        *value = create_list_with_item(r, *value);
     if (!r->has_memory || find_node_by_index(r, *value)->type != YAML_SEQUENCE_NODE) return;
     for (int i = 0; r->has_memory && find_node_by_index(r, *value)->data.sequence.items.start + i <
                                          find_node_by_index(r, *value)->data.sequence.items.top;
          i++) {
         int item = find_node_by_index(r, *value)->data.sequence.items.start[i];
-        expand_text(r, "path", &item);
+        expand_text_to_mapping(r, "path", &item);
         if (item) find_node_by_index(r, *value)->data.sequence.items.start[i] = item;
     }
 }
 
 /* Expands `true` to an empty mapping. In such a mapping all keys have their default values. If the value is `false`,
  * *value becomes 0; the caller then removes the pair of the key and the value. */
-static void expand_switch(rewrite *r, int *value)
+static void expand_boolean_to_mapping(rewrite *r, int *value)
 {
-    const char *text = node_text(r, *value);
+    const char *text = get_scalar_text_or_null(r, *value);
     if (!text) return;
-    if (strcmp(text, "true") == 0) *value = make_mapping(r);
+    if (strcmp(text, "true") == 0) *value = create_mapping_node(r);
     if (strcmp(text, "false") == 0) *value = 0;
 }
 
 /* Expands `automatic` to {automatic: {}}. */
-static void expand_camera(rewrite *r, int *value)
+static void expand_automatic_camera(rewrite *r, int *value)
 {
-    const char *text = node_text(r, *value);
+    const char *text = get_scalar_text_or_null(r, *value);
     if (!text || strcmp(text, "automatic") != 0) return;
-    *value = make_mapping(r);
-    append_pair(r, *value, "automatic", make_mapping(r));
+    *value = create_mapping_node(r);
+    append_pair(r, *value, "automatic", create_mapping_node(r));
 }
 
 /* Expands a single number to a list of this number. */
-static void expand_values(rewrite *r, int *value)
+static void expand_number_to_list(rewrite *r, int *value)
 {
-    const char *text = node_text(r, *value);
-    if (text && *text && !text[strspn(text, "+-.0123456789eE")]) *value = make_list_of(r, *value);
+    const char *text = get_scalar_text_or_null(r, *value);
+    if (text && *text && !text[strspn(text, "+-.0123456789eE")]) *value = create_list_with_item(r, *value);
 }
 
 /* Expands a single mapping to a list of this mapping. */
-static void expand_mappings(rewrite *r, int *value)
+static void expand_single_mapping_to_list(rewrite *r, int *value)
 {
-    if (find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+    if (find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = create_list_with_item(r, *value);
 }
 
 /* Adds a plane perpendicular to z to a slice that has no key `planes`. */
-static void expand_slice(rewrite *r, int *value)
+static void add_default_plane_to_slice(rewrite *r, int *value)
 {
     static const double z[3] = {0, 0, 1};
     const yaml_node_t *slice = find_node_by_index(r, *value);
     if (slice->type != YAML_MAPPING_NODE) return;
     for (const yaml_node_pair_t *p = slice->data.mapping.pairs.start; p < slice->data.mapping.pairs.top; p++) {
-        const char *key = node_text(r, p->key);
+        const char *key = get_scalar_text_or_null(r, p->key);
         if (key && strcmp(key, "planes") == 0) return;
     }
-    const int plane = make_mapping(r);
-    append_pair(r, plane, "normal", make_vector(r, z));
-    append_pair(r, *value, "planes", make_list_of(r, plane));
+    const int plane = create_mapping_node(r);
+    append_pair(r, plane, "normal", create_vector_node(r, z));
+    append_pair(r, *value, "planes", create_list_with_item(r, plane));
 }
 
 /* Expands a mapping with names as keys to a list of mappings with the key `name`. A value that is not a mapping is
@@ -230,14 +231,14 @@ static void expand_slice(rewrite *r, int *value)
 static void expand_mapping_to_named_list(rewrite *r, const char *text_key, int *value)
 {
     if (find_node_by_index(r, *value)->type != YAML_MAPPING_NODE) return;
-    const int list = make_list(r), from = *value;
+    const int list = create_list_node(r), from = *value;
     const int count = (int)(find_node_by_index(r, from)->data.mapping.pairs.top -
                             find_node_by_index(r, from)->data.mapping.pairs.start);
     for (int i = 0; i < count && r->has_memory; i++) {
         const yaml_node_pair_t pair = find_node_by_index(r, from)->data.mapping.pairs.start[i];
         const bool is_mapping = find_node_by_index(r, pair.value)->type == YAML_MAPPING_NODE;
         r->mark = find_node_by_index(r, pair.key)->start_mark;
-        const int entry = is_mapping || !text_key ? pair.value : make_mapping(r);
+        const int entry = is_mapping || !text_key ? pair.value : create_mapping_node(r);
         if (!is_mapping && text_key) append_pair(r, entry, text_key, pair.value);
         if (is_mapping || text_key) append_pair(r, entry, "name", pair.key);
         append_item(r, list, entry);
@@ -275,19 +276,19 @@ static const struct {
     {"direction", expand_axis, axis_words},
     {"up", expand_axis, axis_words},
     {"axis", expand_axis, axis_words},
-    {"colour_bar", expand_switch, switch_words},
-    {"scale_bar", expand_switch, switch_words},
-    {"ambient_occlusion", expand_switch, switch_words},
-    {"edges", expand_switch, switch_words},
-    {"automatic", expand_switch, switch_words},
-    {"camera", expand_camera, "automatic"},
+    {"colour_bar", expand_boolean_to_mapping, switch_words},
+    {"scale_bar", expand_boolean_to_mapping, switch_words},
+    {"ambient_occlusion", expand_boolean_to_mapping, switch_words},
+    {"edges", expand_boolean_to_mapping, switch_words},
+    {"automatic", expand_boolean_to_mapping, switch_words},
+    {"camera", expand_automatic_camera, "automatic"},
     {"colour_by", expand_field, "a field's name"},
-    {"values", expand_values, "one number"},
-    {"planes", expand_mappings, NULL},
-    {"lights", expand_mappings, NULL},
+    {"values", expand_number_to_list, "one number"},
+    {"planes", expand_single_mapping_to_list, NULL},
+    {"lights", expand_single_mapping_to_list, NULL},
     {"outputs", expand_outputs, "a path"},
-    {"text", expand_mappings, NULL},
-    {"slice", expand_slice, NULL},
+    {"text", expand_single_mapping_to_list, NULL},
+    {"slice", add_default_plane_to_slice, NULL},
     {"fields", expand_fields, "a mapping from names to these, or to expressions"},
     {"meshes", expand_meshes, "a mapping from names to these"},
     {"warp", expand_field, "a field's name"},
@@ -315,22 +316,22 @@ static void replace_word(char *text, size_t size, const char *from, const char *
 }
 
 /* Replaces American spellings in a key: color becomes colour, and center becomes centre. */
-static void expand_key(rewrite *r, int *key)
+static void replace_american_spellings(rewrite *r, int *key)
 {
     char text[64];
-    const char *written = node_text(r, *key);
+    const char *written = get_scalar_text_or_null(r, *key);
     if (!written || strlen(written) >= sizeof text - 2) return;
     snprintf(text, sizeof text, "%s", written);
     replace_word(text, sizeof text, "color", "colour");
     replace_word(text, sizeof text, "center", "centre");
     r->mark = find_node_by_index(r, *key)->start_mark;
-    if (strcmp(text, written) != 0) *key = make_text(r, text);
+    if (strcmp(text, written) != 0) *key = create_scalar_node(r, text);
 }
 
-static void expand_key_and_value(rewrite *r, yaml_node_pair_t *pair)
+static void expand_short_form_of_pair(rewrite *r, yaml_node_pair_t *pair)
 {
-    expand_key(r, &pair->key);
-    const char *key = r->has_memory ? node_text(r, pair->key) : NULL;
+    replace_american_spellings(r, &pair->key);
+    const char *key = r->has_memory ? get_scalar_text_or_null(r, pair->key) : NULL;
     for (size_t i = 0; key && i < sizeof rules / sizeof *rules; i++) {
         if (strcmp(key, rules[i].key) != 0) continue;
         r->mark = find_node_by_index(r, pair->value)->start_mark;
@@ -339,12 +340,12 @@ static void expand_key_and_value(rewrite *r, yaml_node_pair_t *pair)
     }
 }
 
-static void expand_mapping(rewrite *r, int number)
+static void expand_short_forms_in_mapping(rewrite *r, int number)
 {
     yaml_node_pair_t *kept = find_node_by_index(r, number)->data.mapping.pairs.start;
     yaml_node_pair_t *pair = kept, *end = find_node_by_index(r, number)->data.mapping.pairs.top;
     for (; pair < end && r->has_memory; pair++) {
-        expand_key_and_value(r, pair);
+        expand_short_form_of_pair(r, pair);
         if (pair->value) *kept++ = *pair;
     }
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
@@ -352,12 +353,12 @@ static void expand_mapping(rewrite *r, int number)
 
 /* Returns the index of the node that is the value of this key at the top of the file; 0 if the file does not have the
  * key. It is used for mappings whose keys are names that the scene defines. */
-static int find_named_mapping(const rewrite *r, const char *name)
+static int find_top_level_value(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = find_node_by_index(r, 1);
     if (!root || root->type != YAML_MAPPING_NODE) return 0;
     for (const yaml_node_pair_t *p = root->data.mapping.pairs.start; p < root->data.mapping.pairs.top; p++) {
-        const char *key = node_text(r, p->key);
+        const char *key = get_scalar_text_or_null(r, p->key);
         if (key && strcmp(key, name) == 0) return p->value;
     }
     return 0;
@@ -368,12 +369,12 @@ bool scene_expand_shorthand(yaml_document_t *document)
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
     /* the keys of these mappings are names that the scene defines, and have no short forms */
-    const int parameters = find_named_mapping(&r, "parameters"), fields = find_named_mapping(&r, "fields");
-    const int meshes = find_named_mapping(&r, "meshes");
+    const int parameters = find_top_level_value(&r, "parameters"), fields = find_top_level_value(&r, "fields");
+    const int meshes = find_top_level_value(&r, "meshes");
     for (int number = 1; number <= count && r.has_memory; number++)
         if (number != parameters && number != fields && number != meshes &&
             find_node_by_index(&r, number)->type == YAML_MAPPING_NODE)
-            expand_mapping(&r, number);
+            expand_short_forms_in_mapping(&r, number);
     return r.has_memory;
 }
 
@@ -387,7 +388,7 @@ static int find_smaller_integer(int a, int b)
 }
 
 /* Counts the edits between two words (optimal string alignment distance). */
-static int count_edits(const char *a, const char *b)
+static int compute_edit_distance(const char *a, const char *b)
 {
     int rows[3][LONGEST_WORD + 1];
     const int m = (int)strlen(a), n = (int)strlen(b);
@@ -406,7 +407,7 @@ static int count_edits(const char *a, const char *b)
     return rows[m % 3][n];
 }
 
-static bool is_same_word(const char *a, const char *b)
+static bool is_equal_ignoring_case(const char *a, const char *b)
 {
     while (*a && tolower((unsigned char)*a) == tolower((unsigned char)*b)) a++, b++;
     return !*a && !*b;
@@ -511,17 +512,18 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
 
 /* Returns the first candidate that `synonyms` lists as the schema's word for the given word, or NULL if there is
  * none. */
-static const char *find_synonym(const char *word, const char *const *candidates, int count)
+static const char *find_candidate_with_same_meaning(const char *word, const char *const *candidates, int count)
 {
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
         for (int k = 0; k < count; k++)
-            if (is_same_word(word, synonyms[i][0]) && strcmp(candidates[k], synonyms[i][1]) == 0) return candidates[k];
+            if (is_equal_ignoring_case(word, synonyms[i][0]) && strcmp(candidates[k], synonyms[i][1]) == 0)
+                return candidates[k];
     return NULL;
 }
 
-const char *scene_nearest_word(const char *word, const char *const *candidates, int count)
+const char *scene_find_most_similar_word(const char *word, const char *const *candidates, int count)
 {
-    const char *synonym = find_synonym(word, candidates, count);
+    const char *synonym = find_candidate_with_same_meaning(word, candidates, count);
     if (synonym) return synonym;
     const int length = (int)strlen(word);
     const char *nearest = NULL;
@@ -529,7 +531,7 @@ const char *scene_nearest_word(const char *word, const char *const *candidates, 
     if (length < 2 || length > LONGEST_WORD) return NULL;
     for (int i = 0; i < count; i++) {
         if (strlen(candidates[i]) > LONGEST_WORD) continue;
-        const int edits = count_edits(word, candidates[i]);
+        const int edits = compute_edit_distance(word, candidates[i]);
         if (edits >= fewest) continue;
         fewest = edits;
         nearest = candidates[i];

@@ -19,6 +19,6 @@ const char *scene_describe_short_form(const char *key, size_t length);
  * this is the corresponding word of the schema. Otherwise it is the candidate that is reached with the fewest edits
  * (insertion, removal or replacement of a letter, exchange of two neighbouring letters), if their number is at most a
  * third of the word's length. Returns NULL if there is no such candidate. */
-const char *scene_nearest_word(const char *word, const char *const *candidates, int count);
+const char *scene_find_most_similar_word(const char *word, const char *const *candidates, int count);
 
 #endif

@@ -45,7 +45,8 @@ int scene_count_planes(const scene_file_slice *in)
     return count;
 }
 
-static insitu_status check_positions(const scene_document *d, const char *path, int index, const scene_file_plane *in)
+static insitu_status check_position_keys_of_plane(const scene_document *d, const char *path, int index,
+                                                  const scene_file_plane *in)
 {
     char plane[SCENE_PATH_SIZE];
     snprintf(plane, sizeof plane, "%s.planes[%d]", path, index);
@@ -60,11 +61,11 @@ static insitu_status check_positions(const scene_document *d, const char *path, 
 }
 
 /* Adds the planes that one entry of the slice's list describes; an entry may describe several. */
-static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
-                                scene_slice *out)
+static insitu_status add_slice_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
+                                      scene_slice *out)
 {
     scene_plane plane = {.extent_fraction = 0};
-    insitu_status status = check_positions(d, path, index, in);
+    insitu_status status = check_position_keys_of_plane(d, path, index, in);
     if (!status) status = scene_convert_plane(d, path, index, in, &plane);
     const int count = in->offsets ? in->offsets_count : in->count ? *in->count : 1;
     for (int i = 0; i < count && !status; i++) {
@@ -81,7 +82,7 @@ static insitu_status convert_planes(const scene_document *d, const char *path, c
     insitu_status status = INSITU_OK;
     out->planes = base_calloc((size_t)scene_count_planes(in), sizeof *out->planes);
     if (!out->planes) return scene_fail_for_memory(d);
-    for (int i = 0; i < in->planes_count && !status; i++) status = add_planes(d, path, i, &in->planes[i], out);
+    for (int i = 0; i < in->planes_count && !status; i++) status = add_slice_planes(d, path, i, &in->planes[i], out);
     return status;
 }
 

@@ -39,7 +39,7 @@ static insitu_status convert_histogram(const scene_document *d, const char *path
                              out->high);
 }
 
-static insitu_status check_path(const scene_document *d, const char *path, const scene *s, int index)
+static insitu_status check_statistics_path(const scene_document *d, const char *path, const scene *s, int index)
 {
     const char *file = s->statistics[index].path;
     const size_t length = strlen(file);
@@ -64,7 +64,7 @@ insitu_status scene_convert_statistics(const scene_document *d, const scene_file
         to->cycle_interval = from->every ? *from->every : 1;
         to->path = base_strdup(from->path);
         if (!to->path) return scene_fail_for_memory(d);
-        status = check_path(d, path, out, i);
+        status = check_statistics_path(d, path, out, i);
         if (!status) status = convert_histogram(d, path, from->histogram, to);
         if (!status) status = scene_convert_field(d, path, path, from->field, from->component, &to->field);
     }

@@ -5,7 +5,7 @@
 #include "colour_map.h"
 #include "scene_convert.h"
 
-static void convert_edges(const scene_file_edges *in, int height, scene_surface *out)
+static void convert_edge_style(const scene_file_edges *in, int height, scene_surface *out)
 {
     if (!in) return;
     out->edge_width = in->width ? (float)*in->width : fmaxf(1, (float)height / 900);
@@ -30,7 +30,7 @@ static insitu_status convert_threshold(const scene_document *d, const char *laye
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out)
 {
-    convert_edges(in->edges, height, out);
+    convert_edge_style(in->edges, height, out);
     out->opacity = in->opacity ? (float)*in->opacity : 1;
     out->has_material = in->material != NULL;
     out->material = scene_convert_material(in->material);
@@ -38,7 +38,7 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
     for (int c = 0; c < 3; c++) out->colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.8F);
     if (in->colour && in->colour_by)
         return scene_fail_at_key(d, path, "colour", "given beside colour_by, expected one of the two");
-    insitu_status status = scene_convert_meshes(d, path, &out->meshes_field);
+    insitu_status status = scene_convert_mesh_names(d, path, &out->meshes_field);
     if (!status) status = convert_threshold(d, path, in->threshold, &out->threshold);
     if (!status && in->colour_by)
         status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);

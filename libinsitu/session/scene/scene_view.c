@@ -13,24 +13,25 @@ static void copy_vector(double to[3], const double *from)
     memcpy(to, from, 3 * sizeof *to);
 }
 
-static insitu_status convert_up(const scene_document *d, const char *path, const double *given, scene_camera *out)
+static insitu_status convert_up_direction(const scene_document *d, const char *path, const double *given,
+                                          scene_camera *out)
 {
     static const double along_y[3] = {0, 1, 0}, along_z[3] = {0, 0, 1};
     if (!given) {
-        copy_vector(out->up, scene_is_parallel(along_y, out->direction) ? along_z : along_y);
+        copy_vector(out->up, scene_are_vectors_parallel(along_y, out->direction) ? along_z : along_y);
         return INSITU_OK;
     }
     copy_vector(out->up, given);
-    if (!scene_normalize(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
-    if (scene_is_parallel(out->up, out->direction)) {
+    if (!scene_normalize_vector(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
+    if (scene_are_vectors_parallel(out->up, out->direction)) {
         return scene_fail_at_key(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
                                  given[0], given[1], given[2]);
     }
     return INSITU_OK;
 }
 
-static insitu_status convert_given_position(const scene_document *d, const char *path, const scene_file_camera *in,
-                                            scene_camera *out)
+static insitu_status convert_explicit_camera_position(const scene_document *d, const char *path,
+                                                      const scene_file_camera *in, scene_camera *out)
 {
     if (in->automatic) {
         return scene_fail_at_key(d, path, "automatic", "given beside %s, expected one of the two",
@@ -47,12 +48,13 @@ static insitu_status convert_given_position(const scene_document *d, const char 
             return scene_fail_at_key(d, path, "position", "too far from focal, expected a finite distance");
         }
     }
-    if (scene_normalize(out->direction)) return INSITU_OK;
+    if (scene_normalize_vector(out->direction)) return INSITU_OK;
     return scene_fail_at_key(d, path, "focal", "[%g, %g, %g] is the position too, expected another point",
                              out->focal[0], out->focal[1], out->focal[2]);
 }
 
-static insitu_status convert_bounds(const scene_document *d, const char *path, const double (*in)[3], scene_camera *out)
+static insitu_status convert_camera_bounds(const scene_document *d, const char *path, const double (*in)[3],
+                                           scene_camera *out)
 {
     if (!in) return INSITU_OK;
     out->has_bounds = true;
@@ -66,32 +68,32 @@ static insitu_status convert_bounds(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-static insitu_status convert_automatic(const scene_document *d, const char *path, const scene_file_automatic *in,
-                                       scene_camera *out)
+static insitu_status convert_automatic_camera(const scene_document *d, const char *path, const scene_file_automatic *in,
+                                              scene_camera *out)
 {
     out->has_direction = in && in->direction;
     out->has_fit = in && in->fit;
     if (out->has_direction) copy_vector(out->direction, in->direction);
     if (in && in->zoom) out->zoom = *in->zoom;
     out->fits_box = in && in->fit && *in->fit == SCENE_FIT_BOX;
-    if (scene_normalize(out->direction))
-        return convert_bounds(d, path, in ? (const double(*)[3])in->bounds : NULL, out);
+    if (scene_normalize_vector(out->direction))
+        return convert_camera_bounds(d, path, in ? (const double(*)[3])in->bounds : NULL, out);
     return scene_fail_at_key(d, path, "automatic.direction", "has length 0, expected a direction");
 }
 
 /* Converts the camera's position and up direction. */
-static insitu_status convert_position(const scene_document *d, const char *path, const scene_file_camera *in,
-                                      scene_camera *out)
+static insitu_status convert_camera_position(const scene_document *d, const char *path, const scene_file_camera *in,
+                                             scene_camera *out)
 {
     const bool is_explicit = (in->position || in->focal) && !in->path && !in->orbit;
     insitu_status status = INSITU_OK;
     if (is_explicit)
-        status = convert_given_position(d, path, in, out);
+        status = convert_explicit_camera_position(d, path, in, out);
     else if (!in->path)
-        status = convert_automatic(d, path, in->automatic, out);
+        status = convert_automatic_camera(d, path, in->automatic, out);
     if (!status && in->orbit) return scene_convert_orbit(d, path, in, out);
     if (!status && in->path) return scene_convert_path(d, path, in, out);
-    return status ? status : convert_up(d, path, in->up, out);
+    return status ? status : convert_up_direction(d, path, in->up, out);
 }
 
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -102,7 +104,7 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
     if (!in) in = &none;
     if (in->angle) out->angle = *in->angle;
     out->has_up = in->up != NULL;
-    insitu_status status = convert_position(d, path, in, out);
+    insitu_status status = convert_camera_position(d, path, in, out);
     out->has_projection = in->projection != NULL;
     out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
     out->height = in->height ? *in->height : 0;
@@ -121,7 +123,7 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
         const float linear = in->colour ? colour_linear_from_srgb((float)in->colour[i]) : 1;
         out->colour[i] = (float)intensity * linear;
     }
-    return scene_normalize(out->direction)
+    return scene_normalize_vector(out->direction)
                ? INSITU_OK
                : scene_fail_at_key(d, path, "direction", "has length 0, expected a direction");
 }
@@ -132,8 +134,8 @@ static void set_default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};
     lights[1] = (scene_light){.direction = {-0.8, 0.1, 0.6}, .colour = {0.35F, 0.35F, 0.35F}};
-    scene_normalize(lights[0].direction);
-    scene_normalize(lights[1].direction);
+    scene_normalize_vector(lights[0].direction);
+    scene_normalize_vector(lights[1].direction);
 }
 
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,

@@ -17,6 +17,6 @@ void scene_describe_expected_value(const char *path, const cyaml_schema_value_t 
                                    char expected[SCENE_WORDS_SIZE]);
 
 /* Returns whether a list is a colour: 3 or 4 numbers from 0 to 1. scene_shorthand.c also accepts names for colours. */
-bool scene_is_colour(const cyaml_schema_value_t *list, const scene_key *key);
+bool scene_is_colour_schema(const cyaml_schema_value_t *list, const scene_key *key);
 
 #endif

@@ -20,7 +20,7 @@
 static const double max_filled = 0.95;
 
 /* Returns `up` or, if `up` is parallel to the direction of view, a coordinate axis that is not parallel to it. */
-static void choose_up(const double direction[3], const double up[3], double out[3])
+static void choose_valid_up_direction(const double direction[3], const double up[3], double out[3])
 {
     double cross[3];
     vector3_cross(direction, up, cross);
@@ -39,7 +39,7 @@ typedef struct camera_tangents {
     double horizontal, vertical;
 } camera_tangents;
 
-static camera_tangents find_tangents(const scene_image *image)
+static camera_tangents compute_tangents_of_view_angle(const scene_image *image)
 {
     const double up = tan(image->camera.angle * (3.14159265358979323846 / 360));
     return (camera_tangents){up * image->width / image->height, up};
@@ -71,13 +71,13 @@ typedef struct camera_fit {
 static const double bar_space = 6.5, title_space = 2.4, line_space = 1.5, ruler_space = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
-static double subtract_decoration_space(double most, double words, double pixels)
+static double compute_free_frame_fraction(double most, double words, double pixels)
 {
     return fmax(most - 2 * words / pixels, 0.5);
 }
 
 /* Returns the number of colour bars. *letters receives the number of letters of the longest label. */
-static int count_bars(const scene_image *image, double *letters)
+static int count_colour_bars(const scene_image *image, double *letters)
 {
     const scene_decorations *d = &image->decorations;
     int count = image->slice_count + image->volume_count;
@@ -90,7 +90,7 @@ static int count_bars(const scene_image *image, double *letters)
 }
 
 /* Returns whether some output file of the image has the colour bars inside the picture, instead of beside it. */
-static bool has_bars_inside(const scene_image *image)
+static bool has_colour_bars_inside_picture(const scene_image *image)
 {
     bool is_any = image->output_count == 0;
     for (int i = 0; i < image->output_count; i++) is_any = is_any || !image->outputs[i].shares_bars;
@@ -98,21 +98,22 @@ static bool has_bars_inside(const scene_image *image)
 }
 
 /* Returns the width of all columns of colour bars, as a multiple of the height of text. */
-static double find_bar_width(const scene_image *image)
+static double compute_colour_bar_width(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
     double letters;
-    const int count = count_bars(image, &letters);
+    const int count = count_colour_bars(image, &letters);
     const double words = letter_width * letters, width = fmax(bar_space, fmin(words, label_width) + bar_borders);
     const double each = bar_height + line_height * fmax(1, ceil(words / label_width));
     const double rows = fmax(1, floor((1 / d->size - (d->title ? title_space : 0) - bar_borders) / each));
-    return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
+    return has_colour_bars_inside_picture(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
 /* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text. It
  * is the largest of the heights of the lines in the middle, at the left corner and at the right corner. A corner is
  * included only if one of its lines extends far into the picture. */
-static double find_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
+static double compute_text_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left,
+                                        scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
     const double long_line = 0.3 * image->width / (d->size * image->height * letter_width);
@@ -133,23 +134,25 @@ static double find_lines_height(const scene_image *image, scene_anchor middle, s
 
 /* Returns the part of the frame that decorations leave free: for each side, the distance of its border from the centre,
  * as a fraction of half the frame. `most` is the fraction without decorations. */
-static camera_frame find_free_frame(const scene_image *image, double most)
+static camera_frame compute_frame_without_decorations(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
     if (!d->is_given) return (camera_frame){most, most, most, most};
-    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_space : 0, bars = find_bar_width(image);
+    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_space : 0,
+                 bars = compute_colour_bar_width(image);
     const double top =
-        (d->title ? title_space : 0) + find_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
-    const double foot = find_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
+        (d->title ? title_space : 0) + compute_text_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
+    const double foot = compute_text_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
     const double right = rulers + (d->bar_anchor == SCENE_RIGHT ? bars : 0);
     const double left = rulers + (d->bar_anchor == SCENE_LEFT ? bars : 0);
-    return (camera_frame){.right = subtract_decoration_space(most, right * size, image->width),
-                          .left = subtract_decoration_space(most, left * size, image->width),
-                          .up = subtract_decoration_space(most, top * size, image->height),
-                          .down = subtract_decoration_space(most, (rulers + foot) * size, image->height)};
+    return (camera_frame){.right = compute_free_frame_fraction(most, right * size, image->width),
+                          .left = compute_free_frame_fraction(most, left * size, image->width),
+                          .up = compute_free_frame_fraction(most, top * size, image->height),
+                          .down = compute_free_frame_fraction(most, (rulers + foot) * size, image->height)};
 }
 
-static corner_reach find_reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
+static corner_reach compute_extent_of_corners_in_view(const session_extent *e, const render_camera *axes,
+                                                      const camera_frame *f)
 {
     corner_reach r = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
     for (int corner = 0; corner < 8; corner++) {
@@ -165,30 +168,31 @@ static corner_reach find_reach_of_corners(const session_extent *e, const render_
     return r;
 }
 
-static corner_reach find_reach_of_sphere(double radius, const camera_frame *f)
+static corner_reach compute_extent_of_sphere_in_view(double radius, const camera_frame *f)
 {
     return (corner_reach){radius * hypot(1, f->right), radius * hypot(1, f->left), radius * hypot(1, f->up),
                           radius * hypot(1, f->down), radius};
 }
 
-static camera_fit make_fit(const session_extent *e, const render_camera *axes, const scene_image *image)
+static camera_fit compute_camera_fit(const session_extent *e, const render_camera *axes, const scene_image *image)
 {
     static const camera_frame nothing;
-    const camera_tangents t = find_tangents(image);
+    const camera_tangents t = compute_tangents_of_view_angle(image);
     const bool by_box = image->camera.fits_box && e->half_diagonal > 0;
-    const camera_frame share = find_free_frame(image, by_box ? max_filled : 1);
+    const camera_frame share = compute_frame_without_decorations(image, by_box ? max_filled : 1);
     const double radius = e->half_diagonal > 0 ? e->half_diagonal : 1;
     camera_fit fit = {.frame_fractions = share, .is_centred = by_box};
     fit.tangents = (camera_frame){share.right * t.horizontal, share.left * t.horizontal, share.up * t.vertical,
                                   share.down * t.vertical};
-    fit.perspective_reach =
-        by_box ? find_reach_of_corners(e, axes, &fit.tangents) : find_reach_of_sphere(radius, &fit.tangents);
-    fit.orthographic_reach = by_box ? find_reach_of_corners(e, axes, &nothing) : find_reach_of_sphere(radius, &nothing);
+    fit.perspective_reach = by_box ? compute_extent_of_corners_in_view(e, axes, &fit.tangents)
+                                   : compute_extent_of_sphere_in_view(radius, &fit.tangents);
+    fit.orthographic_reach = by_box ? compute_extent_of_corners_in_view(e, axes, &nothing)
+                                    : compute_extent_of_sphere_in_view(radius, &nothing);
     return fit;
 }
 
 /* Returns the distance of the eye from the centre of the bounds. */
-static double find_eye_distance(const camera_fit *fit, double half_diagonal)
+static double compute_eye_distance(const camera_fit *fit, double half_diagonal)
 {
     const corner_reach *near = &fit->perspective_reach;
     const camera_frame *f = &fit->tangents;
@@ -200,7 +204,7 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
 
 /* Returns half the height of an orthographic picture in which all data fits. aspect: width of the picture divided by
  * its height. */
-static double find_fitting_height(const camera_fit *fit, double aspect)
+static double compute_fitting_half_height(const camera_fit *fit, double aspect)
 {
     const double across = (fit->orthographic_reach.right + fit->orthographic_reach.left) /
                           (fit->frame_fractions.right + fit->frame_fractions.left) / aspect;
@@ -219,18 +223,18 @@ static double choose_eye_position(double low, double high, bool is_centred)
 
 /* Returns half the height of an orthographic picture in scene units: the scene's height, if it is given, otherwise
  * `fitting`. */
-static double find_half_height(const scene_image *image, double fitting)
+static double choose_half_height_of_picture(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
 /* Makes the camera orthographic if the scene requests it. The eye keeps its position, from which all data is visible,
  * because an orthographic picture does not depend on the distance. */
-static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
+static void make_orthographic_if_requested(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;
     camera->is_orthographic = true;
-    camera->half_height = find_half_height(image, half_height);
+    camera->half_height = choose_half_height_of_picture(image, half_height);
 }
 
 /* Computes an automatic camera. Positions are relative to the centre of the bounds until the camera is complete, so
@@ -243,13 +247,14 @@ static bool make_automatic_camera(const session_extent *extent, const scene_imag
     double eye[3], focal[3], up[3];
     render_camera axes;
     for (int a = 0; a < 3; a++) eye[a] = c->direction[a] / vector3_length(c->direction) * radius;
-    choose_up(c->direction, c->up, up);
+    choose_valid_up_direction(c->direction, c->up, up);
     if (!render_camera_look_at(&axes, eye, middle, up, c->angle, image->width, image->height)) return false;
-    const camera_fit fit = make_fit(extent, &axes, image);
+    const camera_fit fit = compute_camera_fit(extent, &axes, image);
     const bool is_flat = c->is_orthographic;
     const double aspect = (double)image->width / image->height;
-    const double back = is_flat ? 2 * radius : find_eye_distance(&fit, extent->half_diagonal) / c->zoom;
-    const double half_height = find_half_height(image, find_fitting_height(&fit, aspect) / c->zoom);
+    const double back = is_flat ? 2 * radius : compute_eye_distance(&fit, extent->half_diagonal) / c->zoom;
+    const double half_height =
+        choose_half_height_of_picture(image, compute_fitting_half_height(&fit, aspect) / c->zoom);
     const corner_reach *reach = is_flat ? &fit.orthographic_reach : &fit.perspective_reach;
     const camera_frame *f = is_flat ? &fit.frame_fractions : &fit.tangents;
     const double across = is_flat ? half_height * aspect : back, high = is_flat ? half_height : back;
@@ -262,7 +267,7 @@ static bool make_automatic_camera(const session_extent *extent, const scene_imag
     }
     if (!render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height)) return false;
     for (int a = 0; a < 3; a++) out->eye[a] += 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
-    set_orthographic(image, half_height, out);
+    make_orthographic_if_requested(image, half_height, out);
     return true;
 }
 
@@ -271,7 +276,7 @@ static bool make_explicit_camera(const scene_image *image, render_camera *out)
     const scene_camera *c = &image->camera;
     if (!render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height)) return false;
     const double between[3] = {c->eye[0] - c->focal[0], c->eye[1] - c->focal[1], c->eye[2] - c->focal[2]};
-    set_orthographic(image, out->half_height * vector3_length(between), out);
+    make_orthographic_if_requested(image, out->half_height * vector3_length(between), out);
     return true;
 }
 
@@ -279,7 +284,7 @@ static bool make_explicit_camera(const scene_image *image, render_camera *out)
 
 /* Makes the camera look at data that is flat along `axis`, so that of the other two axes, the first points to the right
  * and the second points up. Keys of the camera that the scene gives are kept. */
-static void turn_camera_to_flat_data(int axis, scene_camera *c)
+static void set_default_view_of_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};
     static const double upward[3][3] = {{0, 0, 1}, {0, 0, 1}, {0, 1, 0}};
@@ -302,7 +307,7 @@ static bool make_camera_by_bounds(const session_extent *data, const scene_image 
         extent.half_diagonal = vector3_length(half);
     }
     const int axis = session_flat_axis(&extent);
-    if (axis >= 0 && c->orbit.view_count == 0) turn_camera_to_flat_data(axis, c);
+    if (axis >= 0 && c->orbit.view_count == 0) set_default_view_of_flat_data(axis, c);
     return make_automatic_camera(&extent, &seen, out);
 }
 

@@ -56,7 +56,7 @@ static void make_empty_box(clip_box *box)
     box->lower[0] = INFINITY;
 }
 
-static void intersect_box(clip_box *box, const double lower[3], const double upper[3])
+static void intersect_box_with_box(clip_box *box, const double lower[3], const double upper[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         box->lower[axis] = fmax(box->lower[axis], lower[axis]);
@@ -66,7 +66,7 @@ static void intersect_box(clip_box *box, const double lower[3], const double upp
 
 /* Shrinks the box to the bounds of its part with normal . x <= distance. The limit along an axis follows from the
  * distance that remains after the smallest contributions of the other two axes to normal . x are subtracted. */
-static void intersect_plane(clip_box *box, const render_clip *clip)
+static void shrink_box_to_half_space(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;
     for (int axis = 0; axis < 3; axis++) {
@@ -83,7 +83,8 @@ static void intersect_plane(clip_box *box, const render_clip *clip)
 }
 
 /* Computes the distances from a sphere's centre to the nearest and the farthest point of the box. */
-static void find_distances(const clip_box *box, const double centre[3], double *nearest, double *farthest)
+static void compute_distances_of_box_from_point(const clip_box *box, const double centre[3], double *nearest,
+                                                double *farthest)
 {
     double near[3], far[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -95,20 +96,20 @@ static void find_distances(const clip_box *box, const double centre[3], double *
     *farthest = sqrt(vector3_dot(far, far));
 }
 
-static void intersect_sphere(clip_box *box, const render_clip *clip)
+static void shrink_box_to_sphere(clip_box *box, const render_clip *clip)
 {
     double nearest, farthest, lower[3], upper[3];
-    find_distances(box, clip->centre, &nearest, &farthest);
+    compute_distances_of_box_from_point(box, clip->centre, &nearest, &farthest);
     if (clip->is_outside ? farthest < clip->radius : nearest > clip->radius) make_empty_box(box);
     if (clip->is_outside) return;
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = clip->centre[axis] - clip->radius;
         upper[axis] = clip->centre[axis] + clip->radius;
     }
-    intersect_box(box, lower, upper);
+    intersect_box_with_box(box, lower, upper);
 }
 
-static void subtract_box(clip_box *box, const render_clip *clip)
+static void shrink_box_outside_clip_box(clip_box *box, const render_clip *clip)
 {
     bool is_within = true;
     for (int axis = 0; axis < 3; axis++)
@@ -116,20 +117,20 @@ static void subtract_box(clip_box *box, const render_clip *clip)
     if (is_within) make_empty_box(box);
 }
 
-static void intersect_clip(clip_box *box, const render_clip *clip)
+static void shrink_box_to_clip(clip_box *box, const render_clip *clip)
 {
     switch (clip->kind) {
-    case RENDER_CLIP_PLANE: intersect_plane(box, clip); break;
-    case RENDER_CLIP_SPHERE: intersect_sphere(box, clip); break;
+    case RENDER_CLIP_PLANE: shrink_box_to_half_space(box, clip); break;
+    case RENDER_CLIP_SPHERE: shrink_box_to_sphere(box, clip); break;
     case RENDER_CLIP_BOX:
         if (clip->is_outside)
-            subtract_box(box, clip);
+            shrink_box_outside_clip_box(box, clip);
         else
-            intersect_box(box, clip->lower, clip->upper);
+            intersect_box_with_box(box, clip->lower, clip->upper);
     }
 }
 
-static bool do_clips_remove_all(const session_extent *e, const render_clip *clips, int count, uint32_t set)
+static bool do_clips_remove_all_data(const session_extent *e, const render_clip *clips, int count, uint32_t set)
 {
     enum { TURNS = 8 };
     clip_box box;
@@ -137,7 +138,7 @@ static bool do_clips_remove_all(const session_extent *e, const render_clip *clip
     memcpy(box.upper, e->upper, sizeof box.upper);
     for (int turn = 0; turn < TURNS; turn++)
         for (int i = 0; i < count && !is_empty_box(&box); i++)
-            if (set >> i & 1) intersect_clip(&box, &clips[i]);
+            if (set >> i & 1) shrink_box_to_clip(&box, &clips[i]);
     return is_empty_box(&box);
 }
 
@@ -153,30 +154,32 @@ typedef struct clip_basis {
     bool is_empty;
 } clip_basis;
 
-static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)
+static void warn_if_clips_remove_layer(const clip_basis *b, const char *layer, const char *field, int number,
+                                       uint32_t set)
 {
     const session_extent *e = b->extent;
     const session_warning warning = {WARNING_CLIP, b->image->name, layer, number};
-    const bool holds = !b->is_empty && do_clips_remove_all(e, b->clips, b->image->clip_count, set);
+    const bool holds = !b->is_empty && do_clips_remove_all_data(e, b->clips, b->image->clip_count, set);
     session_warn(b->report, &warning, holds,
                  "image \"%s\": clip leaves nothing of %s%s%s%s: the cells lie between (%g, %g, %g) and (%g, %g, %g)",
                  b->image->name, layer, field ? " of \"" : "", field ? field : "", field ? "\"" : "", e->lower[0],
                  e->lower[1], e->lower[2], e->upper[0], e->upper[1], e->upper[2]);
 }
 
-void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
-                           session_report *report)
+void session_warn_of_layers_clipped_away(const session_extent *extent, const scene_image *image,
+                                         const render_clip *clips, session_report *report)
 {
     clip_basis basis = {extent, image, clips, report, extent->cell_count == 0};
     if (image->variant.view > 0 || image->clip_count == 0) return;
-    warn_of_layer(&basis, "the picture", NULL, 0, image->clips_of_all);
-    basis.is_empty = basis.is_empty || do_clips_remove_all(extent, clips, image->clip_count, image->clips_of_all);
+    warn_if_clips_remove_layer(&basis, "the picture", NULL, 0, image->clips_of_all);
+    basis.is_empty = basis.is_empty || do_clips_remove_all_data(extent, clips, image->clip_count, image->clips_of_all);
     for (int i = 0; i < image->isosurface_count; i++)
-        warn_of_layer(&basis, "the isosurface", image->isosurfaces[i].field.name, i, image->isosurfaces[i].clips);
+        warn_if_clips_remove_layer(&basis, "the isosurface", image->isosurfaces[i].field.name, i,
+                                   image->isosurfaces[i].clips);
     for (int i = 0; i < image->volume_count; i++)
-        warn_of_layer(&basis, "the volume", image->volumes[i].field.name, i, image->volumes[i].clips);
+        warn_if_clips_remove_layer(&basis, "the volume", image->volumes[i].field.name, i, image->volumes[i].clips);
     for (int i = 0; i < image->slice_count; i++)
-        warn_of_layer(&basis, "the slice", image->slices[i].field.name, i, image->slices[i].clips);
+        warn_if_clips_remove_layer(&basis, "the slice", image->slices[i].field.name, i, image->slices[i].clips);
     for (int i = 0; i < image->surface_count; i++)
-        warn_of_layer(&basis, "the surface", NULL, i, image->surfaces[i].clips);
+        warn_if_clips_remove_layer(&basis, "the surface", NULL, i, image->surfaces[i].clips);
 }

@@ -13,7 +13,7 @@ void session_make_clips(const session_extent *extent, const scene_image *image, 
 
 /* Warns of layers that are cut away completely: the clips leave no point within the bounds of all cells. Local; the
  * result is the same on every rank. */
-void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
-                           session_report *report);
+void session_warn_of_layers_clipped_away(const session_extent *extent, const scene_image *image,
+                                         const render_clip *clips, session_report *report);
 
 #endif

@@ -9,7 +9,7 @@ _Static_assert((int)RENDER_MAX_LINES == (int)SCENE_MAX_LINES, "a scene's lines h
 
 /* Computes values that divide the range into parts of equal width on the range's scale, which may be logarithmic. If
  * two values are equal after rounding, only one of them is stored. */
-static void divide_range(const render_transfer *range, int count, session_contours *out)
+static void compute_evenly_spaced_values(const render_transfer *range, int count, session_contours *out)
 {
     const double low = render_scaled(range->scale, range->threshold, range->low);
     const double high = render_scaled(range->scale, range->threshold, range->high);
@@ -21,8 +21,9 @@ static void divide_range(const render_transfer *range, int count, session_contou
     }
 }
 
-insitu_status session_make_contours(const session_meshes *meshes, const session_team *team, const scene_lines *in,
-                                    const render_transfer *colours, session_contours *out, base_error *error)
+insitu_status session_compute_contour_lines(const session_meshes *meshes, const session_team *team,
+                                            const scene_lines *in, const render_transfer *colours,
+                                            session_contours *out, base_error *error)
 {
     insitu_status status = INSITU_OK;
     *out = (session_contours){.lines = {.values = out->values, .width = in->width, .is_alone = in->is_alone}};
@@ -36,6 +37,6 @@ insitu_status session_make_contours(const session_meshes *meshes, const session_
     render_transfer range = {.scale = RENDER_LINEAR};
     const session_range_subject values = {&in->field, NULL, false};
     if (!colours) status = session_find_extremes(meshes, team, &values, &range.low, &range.high, error);
-    if (!status) divide_range(colours ? colours : &range, in->count, out);
+    if (!status) compute_evenly_spaced_values(colours ? colours : &range, in->count, out);
     return status;
 }

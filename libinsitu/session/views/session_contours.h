@@ -17,7 +17,8 @@ typedef struct session_contours {
 /* Computes the contour lines, except the field that they show. If the scene gives no values, the lines divide a range
  * into equal parts. This is the range of `colours`, the transfer function of the layer's colours; if colours is NULL,
  * it is the range of the field whose contour lines are drawn. Collective; the result is the same on all ranks. */
-insitu_status session_make_contours(const session_meshes *meshes, const session_team *team, const scene_lines *in,
-                                    const render_transfer *colours, session_contours *out, base_error *error);
+insitu_status session_compute_contour_lines(const session_meshes *meshes, const session_team *team,
+                                            const scene_lines *in, const render_transfer *colours,
+                                            session_contours *out, base_error *error);
 
 #endif

@@ -27,8 +27,9 @@ void session_free_due_views(session_due_views *views)
     base_free(views->cameras);
 }
 
-insitu_status session_make_due_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
-                                     MPI_Comm comm, session_due_views *out, base_error *error)
+insitu_status session_compute_cameras_of_due_images(const scene *scene, const session_moment *moment,
+                                                    const session_meshes *meshes, MPI_Comm comm, session_due_views *out,
+                                                    base_error *error)
 {
     bool needs_extent = false;
     *out = (session_due_views){.scene = scene, .count = scene->image_count};
@@ -47,7 +48,7 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
     if (needs_extent && session_find_nodal_extent(meshes, comm, &out->extent, error)) return error->status;
     for (int i = 0; i < out->count; i++) {
         scene_image placed = scene->images[i];
-        placed.camera = scene_camera_at(&placed.camera, moment->cycle, moment->time);
+        placed.camera = scene_compute_camera_at_time(&placed.camera, moment->cycle, moment->time);
         out->are_due[i] = out->are_due[i] && session_make_camera(&out->extent, &placed, &out->cameras[i]);
     }
     return INSITU_OK;
@@ -57,7 +58,7 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
  * sphere. In perspective, a displacement d of a point at the depth z along the camera's axis, at the distance s from
  * the eye, appears at most as large as d s / z^2 on the plane at depth 1. A sphere that is nearer than its radius is
  * treated as if its depth were its radius. */
-static double find_pixel_size_in_view(const render_camera *camera, const double centre[3], double radius)
+static double compute_pixel_size_bound_in_view(const render_camera *camera, const double centre[3], double radius)
 {
     const double aspect = (double)camera->width / camera->height, half = camera->half_height;
     double to[3];
@@ -73,13 +74,13 @@ static double find_pixel_size_in_view(const render_camera *camera, const double 
     return 2 * half * near * near / (camera->height * fmax(vector3_length(to) + radius, near));
 }
 
-double session_error_request_pixel_size(const void *of, const double centre[3], double radius)
+double session_find_smallest_pixel_size(const void *of, const double centre[3], double radius)
 {
     const session_error_request *request = of;
     double least = INFINITY;
     for (int i = 0; i < request->views->count; i++)
         if (request->images[i])
-            least = fmin(least, find_pixel_size_in_view(&request->views->cameras[i], centre, radius));
+            least = fmin(least, compute_pixel_size_bound_in_view(&request->views->cameras[i], centre, radius));
     return least;
 }
 
@@ -101,7 +102,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
 }
 
 /* Returns whether two volumes have the same transfer function. The pictures of a sweep have copies of one volume. */
-static bool is_same_volume(const scene_volume *a, const scene_volume *b)
+static bool has_same_transfer_function(const scene_volume *a, const scene_volume *b)
 {
     if (!a || !b) return a == b;
     const scene_colour_map *x = &a->colour_map, *y = &b->colour_map;
@@ -116,7 +117,7 @@ static bool is_same_volume(const scene_volume *a, const scene_volume *b)
 
 static bool is_same_request(const session_error_request *a, const session_error_request *b)
 {
-    if (!is_same_volume(a->volume, b->volume) || a->allowed != b->allowed) return false;
+    if (!has_same_transfer_function(a->volume, b->volume) || a->allowed != b->allowed) return false;
     if (a->has_plane || b->has_plane) return a->has_plane && b->has_plane && is_same_plane(&a->plane, &b->plane);
     if (!a->field || !b->field) return !a->field && !b->field;
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
@@ -124,8 +125,9 @@ static bool is_same_request(const session_error_request *a, const session_error_
 
 /* Returns the request in the list that equals `like`, and adds it if the list does not contain it. If the list is full,
  * returns the request for positions, which is the first one, and sets needs_all, so that all cells are refined. */
-static session_error_request *find_or_add_request(session_error_requests *requests, const session_due_views *views,
-                                                  const session_error_request *like)
+static session_error_request *find_or_add_error_request(session_error_requests *requests,
+                                                        const session_due_views *views,
+                                                        const session_error_request *like)
 {
     for (int i = 0; i < requests->count; i++)
         if (is_same_request(&requests->items[i], like)) return &requests->items[i];
@@ -139,16 +141,17 @@ static session_error_request *find_or_add_request(session_error_requests *reques
     return request;
 }
 
-static session_error_request *mark_request_as_shown(session_error_requests *requests, const session_due_views *views,
-                                                    const session_error_request *like, int image)
+static session_error_request *add_error_request_of_image(session_error_requests *requests,
+                                                         const session_due_views *views,
+                                                         const session_error_request *like, int image)
 {
-    session_error_request *request = find_or_add_request(requests, views, like);
+    session_error_request *request = find_or_add_error_request(requests, views, like);
     request->is_shown = requests->is_shown = true;
     if (requests->is_complete) request->images[image] = true;
     return request;
 }
 
-static void add_value(session_error_requests *requests, session_error_request *request, double value)
+static void add_isovalue_to_request(session_error_requests *requests, session_error_request *request, double value)
 {
     for (int i = 0; i < request->value_count; i++)
         if (request->values[i] == value) return;
@@ -166,35 +169,35 @@ static const session_catalogue_field *find_shown_field(const session_catalogue_m
 
 /* Returns whether the layer shows the values that the caller gave, unchanged. These values do not depend on other
  * cells. */
-static bool shows_given_values(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
-                               const scene_field *shown)
+static bool is_field_shown_unchanged(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
+                                     const scene_field *shown)
 {
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
 }
 
 /* Returns whether the scalar that the layer shows is a polynomial in each cell: the caller's values at nodes, or one
  * component of these values. */
-static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
-                          const scene_field *shown)
+static bool is_shown_scalar_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
+                                       const scene_field *shown)
 {
-    return shows_given_values(mesh, field, shown) && field->centring != INSITU_CELL &&
+    return is_field_shown_unchanged(mesh, field, shown) && field->centring != INSITU_CELL &&
            session_resolve_component(shown, field->component_count) >= 0;
 }
 
-static void add_isosurface(session_error_requests *requests, const session_due_views *views,
-                           const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer,
-                           session_report *report)
+static void add_error_request_for_isosurface(session_error_requests *requests, const session_due_views *views,
+                                             const session_catalogue_mesh *mesh, const scene_image *image, int index,
+                                             int layer, session_report *report)
 {
     const scene_isosurface *shown = &image->isosurfaces[layer];
     const session_catalogue_field *field = find_shown_field(mesh, &shown->field);
     session_error_request like = {.field = NULL};
     if (!field) return;
-    const bool is_bounded = is_polynomial(mesh, field, &shown->field);
+    const bool is_bounded = is_shown_scalar_polynomial(mesh, field, &shown->field);
     if (is_bounded) like.field = field->name;
     if (is_bounded) like.component = session_resolve_component(&shown->field, field->component_count);
-    session_error_request *request = mark_request_as_shown(requests, views, &like, index);
+    session_error_request *request = add_error_request_of_image(requests, views, &like, index);
     for (int i = 0; i < shown->value_count && request->field && image->variant.view == 0; i++)
-        add_value(requests, request, shown->values[i]);
+        add_isovalue_to_request(requests, request, shown->values[i]);
     /* central differences sample the field also in neighbours of the cells that the isosurface crosses */
     requests->needs_all = requests->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES;
     if (!report) return;
@@ -205,8 +208,9 @@ static void add_isosurface(session_error_requests *requests, const session_due_v
                  image->name, field->name, mesh->name);
 }
 
-static void add_slice(session_error_requests *requests, const session_due_views *views,
-                      const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer)
+static void add_error_requests_for_slice(session_error_requests *requests, const session_due_views *views,
+                                         const session_catalogue_mesh *mesh, const scene_image *image, int index,
+                                         int layer)
 {
     const scene_slice *shown = &image->slices[layer];
     if (!find_shown_field(mesh, &shown->field)) return;
@@ -214,51 +218,52 @@ static void add_slice(session_error_requests *requests, const session_due_views 
         session_error_request like = {.has_plane = true};
         memcpy(like.plane.normal, shown->planes[i].normal, sizeof like.plane.normal);
         session_find_plane_point(&shown->planes[i], &views->extent, like.plane.point);
-        mark_request_as_shown(requests, views, &like, index);
+        add_error_request_of_image(requests, views, &like, index);
     }
 }
 
-static void add_volume(session_error_requests *requests, const session_due_views *views,
-                       const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer)
+static void add_error_request_for_volume(session_error_requests *requests, const session_due_views *views,
+                                         const session_catalogue_mesh *mesh, const scene_image *image, int index,
+                                         int layer)
 {
     static const double usual_error = 0.01; /* allowed error of volumes for which the scene gives no max_error */
     const scene_volume *shown = &image->volumes[layer];
     const session_catalogue_field *field = find_shown_field(mesh, &shown->field);
-    if (!field || !is_polynomial(mesh, field, &shown->field)) return;
+    if (!field || !is_shown_scalar_polynomial(mesh, field, &shown->field)) return;
     const session_error_request like = {.field = field->name,
                                         .component = session_resolve_component(&shown->field, field->component_count),
                                         .volume = shown,
                                         .allowed = image->max_error > 0 ? image->max_error : usual_error};
-    mark_request_as_shown(requests, views, &like, index);
+    add_error_request_of_image(requests, views, &like, index);
 }
 
 /* Sets needs_all if the image shows a volume of the mesh, and needs_outer if it shows the mesh's outer surface. If the
  * outer surface has a threshold, needs_all is set too, because the outer faces of the selected cells may lie anywhere
  * in the mesh. In each case, marks the request for positions as shown by the image. */
-static void add_whole_layers(session_error_requests *requests, const session_due_views *views,
-                             const session_catalogue_mesh *mesh, int index)
+static void mark_layers_without_error_bound_needs(session_error_requests *requests, const session_due_views *views,
+                                                  const session_catalogue_mesh *mesh, int index)
 {
     const scene_image *image = &views->scene->images[index];
     const session_error_request positions = {.field = NULL};
     for (int i = 0; i < image->volume_count; i++) {
         if (!find_shown_field(mesh, &image->volumes[i].field)) continue;
         requests->needs_all = true;
-        mark_request_as_shown(requests, views, &positions, index);
+        add_error_request_of_image(requests, views, &positions, index);
     }
     for (int i = 0; i < image->surface_count; i++) {
         if (!scene_field_selects_mesh(&image->surfaces[i].meshes_field, mesh->name)) continue;
         requests->needs_outer = true;
         requests->needs_all = requests->needs_all || image->surfaces[i].threshold.is_given;
-        mark_request_as_shown(requests, views, &positions, index);
+        add_error_request_of_image(requests, views, &positions, index);
     }
 }
 
-static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const scene_image *image)
+static bool shows_field_computed_from_neighbours(const session_catalogue_mesh *mesh, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
-    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
+    for (const scene_field *field; (field = scene_find_next_field_of_layers(&walk)) != NULL;) {
         const session_catalogue_field *of = find_shown_field(mesh, field);
-        if (of && !shows_given_values(mesh, of, field)) return true;
+        if (of && !is_field_shown_unchanged(mesh, of, field)) return true;
     }
     return false;
 }
@@ -269,17 +274,19 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
     const session_error_request positions = {.field = NULL};
     bool are_any_due = false;
     *out = (session_error_requests){.is_complete = true, .needs_all = has_shells};
-    find_or_add_request(out, views, &positions);
+    find_or_add_error_request(out, views, &positions);
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &scene->images[i];
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
-        add_whole_layers(out, views, mesh, i);
-        out->needs_all = out->needs_all || has_fields_of_neighbours(mesh, image);
+        mark_layers_without_error_bound_needs(out, views, mesh, i);
+        out->needs_all = out->needs_all || shows_field_computed_from_neighbours(mesh, image);
         for (int layer = 0; layer < image->isosurface_count; layer++)
-            add_isosurface(out, views, mesh, image, i, layer, report);
-        for (int layer = 0; layer < image->volume_count; layer++) add_volume(out, views, mesh, image, i, layer);
-        for (int layer = 0; layer < image->slice_count; layer++) add_slice(out, views, mesh, image, i, layer);
+            add_error_request_for_isosurface(out, views, mesh, image, i, layer, report);
+        for (int layer = 0; layer < image->volume_count; layer++)
+            add_error_request_for_volume(out, views, mesh, image, i, layer);
+        for (int layer = 0; layer < image->slice_count; layer++)
+            add_error_requests_for_slice(out, views, mesh, image, i, layer);
     }
     out->needs_all = out->needs_all || !are_any_due;
 }

@@ -20,8 +20,9 @@ typedef struct session_due_views {
 /* Computes the cameras of the images that are due at `moment`. If a camera has no direction of view, its image is
  * treated as not due; drawing the image returns the error. The caller must free *out even after an error.
  * Collective. */
-insitu_status session_make_due_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
-                                     MPI_Comm comm, session_due_views *out, base_error *error);
+insitu_status session_compute_cameras_of_due_images(const scene *scene, const session_moment *moment,
+                                                    const session_meshes *meshes, MPI_Comm comm, session_due_views *out,
+                                                    base_error *error);
 void session_free_due_views(session_due_views *views);
 
 /* A quantity of a mesh whose error, by the division of cells into linear pieces, is measured: the isosurfaces of a
@@ -64,6 +65,6 @@ void session_free_error_requests(session_error_requests *requests);
 
 /* Returns a lower bound of the size of a pixel, in scene units, at any point of a sphere, in the images that show the
  * session_error_request `of`; INFINITY if none of these images shows the sphere. */
-double session_error_request_pixel_size(const void *of, const double centre[3], double radius);
+double session_find_smallest_pixel_size(const void *of, const double centre[3], double radius);
 
 #endif

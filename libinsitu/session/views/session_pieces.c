@@ -70,7 +70,7 @@ typedef struct part_work {
     session_piece_set *pieces; /* receives the pieces that the request needs; NULL: the errors are measured instead */
 } part_work;
 
-static insitu_status apply_request(part_work *work, base_error *error)
+static insitu_status measure_error_or_select_pieces(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
@@ -79,11 +79,11 @@ static insitu_status apply_request(part_work *work, base_error *error)
     return session_add_crossed_pieces(work->mesh, &work->request, w->choice->parts, threads, work->pieces, error);
 }
 
-static insitu_status use_values(void *of, const session_node_values *values, base_error *error)
+static insitu_status apply_request_to_node_values(void *of, const session_node_values *values, base_error *error)
 {
     part_work *work = of;
     work->request.values = values;
-    return apply_request(work, error);
+    return measure_error_or_select_pieces(work, error);
 }
 
 static void apply_error_request_to_part(part_work *work, const session_error_request *request, base_error *error)
@@ -93,7 +93,7 @@ static void apply_error_request_to_part(part_work *work, const session_error_req
     work->request.component = request->component;
     work->request.isovalues = (session_isovalues){request->value_count, request->values, 0};
     work->request.plane = request->has_plane ? &request->plane : NULL;
-    work->request.pixels = (session_pixels){request, session_error_request_pixel_size};
+    work->request.pixels = (session_pixels){request, session_find_smallest_pixel_size};
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
@@ -103,11 +103,12 @@ static void apply_error_request_to_part(part_work *work, const session_error_req
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
     const int field = request->field ? session_find_field(work->mesh, request->field) : -1;
-    if (!request->field) apply_request(work, error);
-    if (field >= 0) session_pass_node_values(work->mesh, field, use_values, work, error);
+    if (!request->field) measure_error_or_select_pieces(work, error);
+    if (field >= 0) session_pass_node_values(work->mesh, field, apply_request_to_node_values, work, error);
 }
 
-static void measure_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
+static void measure_errors_of_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks,
+                                   base_error *error)
 {
     unsigned char *cells = marks ? marks->cells : NULL;
     part_work work = {.of = w, .mesh = mesh, .request = {.marks = cells}};
@@ -123,8 +124,8 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
 }
 
 /* Adds to the part's set of pieces those pieces of refined cells that the requests need. */
-static void choose_pieces_of_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks,
-                                  base_error *error)
+static void select_needed_pieces_of_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks,
+                                         base_error *error)
 {
     part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
     session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
@@ -148,9 +149,9 @@ static void measure_or_choose_parts(const mesh_work *w, const char *name, base_e
         const session_mesh *mesh = parts.items[i];
         if (!mesh->is_given || !mesh->topology.is_split) continue;
         if (is_chosen)
-            choose_pieces_of_part(w, mesh, &w->choice->marks[i], error);
+            select_needed_pieces_of_part(w, mesh, &w->choice->marks[i], error);
         else
-            measure_part(w, mesh, session_get_marks_of_part(w->choice, i), error);
+            measure_errors_of_part(w, mesh, session_get_marks_of_part(w->choice, i), error);
     }
 }
 
@@ -179,7 +180,7 @@ static void measure_or_choose_mesh(const session_pieces_basis *basis, const sess
 /* Calls the caller's functions that fill the values of fields, for those fields that isosurfaces and volumes show. If
  * such a function fails, its field is not measured, and the error is returned later, when the step's plan is made.
  * Local, but these functions may communicate. */
-static void fill_fields(const session_pieces_basis *basis, const session_due_views *views)
+static void call_fill_functions_of_shown_fields(const session_pieces_basis *basis, const session_due_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
     for (int i = 0; i < views->count; i++) {
@@ -201,7 +202,7 @@ typedef struct piece_sums {
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
 } piece_sums;
 
-static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm, base_error *error)
+static insitu_status reduce_errors_over_ranks(piece_error *errors, int count, MPI_Comm comm, base_error *error)
 {
     enum { WORDS = sizeof(piece_sums) / sizeof(int64_t) };
     double *most = base_calloc((size_t)count + 1, sizeof *most);
@@ -234,9 +235,10 @@ static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm
 }
 
 /* Estimates the errors of the volumes on one mesh. Collective. */
-static insitu_status estimate_volumes(const session_pieces_basis *basis, const session_due_views *views, int mesh,
-                                      const session_finer_choice *choice, const session_value_ranges *ranges,
-                                      piece_error *out, base_error *error)
+static insitu_status estimate_volume_errors_of_mesh(const session_pieces_basis *basis, const session_due_views *views,
+                                                    int mesh, const session_finer_choice *choice,
+                                                    const session_value_ranges *ranges, piece_error *out,
+                                                    base_error *error)
 {
     const session_catalogue_mesh *named = &basis->catalogue->meshes[mesh];
     const session_parts parts = session_find_parts(basis->meshes, named->name);
@@ -259,8 +261,10 @@ static insitu_status estimate_volumes(const session_pieces_basis *basis, const s
 }
 
 /* Estimates the errors of all volumes on meshes with cells of higher order. Collective. */
-static insitu_status estimate_all_volumes(const session_pieces_basis *basis, const session_due_views *views,
-                                          const session_finer_choice *choices, piece_error *errors, base_error *error)
+static insitu_status estimate_volume_errors_of_all_meshes(const session_pieces_basis *basis,
+                                                          const session_due_views *views,
+                                                          const session_finer_choice *choices, piece_error *errors,
+                                                          base_error *error)
 {
     session_value_ranges ranges;
     bool is_any = false;
@@ -270,13 +274,13 @@ static insitu_status estimate_all_volumes(const session_pieces_basis *basis, con
     insitu_status status = session_find_volume_ranges(basis->scene, views, basis->meshes, basis->team, &ranges, error);
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++)
         if (choices[m].order > 1 && !choices[m].excluded_count)
-            status = estimate_volumes(basis, views, m, &choices[m], &ranges, &errors[m], error);
+            status = estimate_volume_errors_of_mesh(basis, views, m, &choices[m], &ranges, &errors[m], error);
     session_free_volume_ranges(&ranges);
     return status;
 }
 
 /* Returns whether a due image shows the outer surface of a mesh. */
-static bool is_outer_shown(const session_due_views *views, const char *mesh)
+static bool is_outer_surface_shown(const session_due_views *views, const char *mesh)
 {
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &views->scene->images[i];
@@ -287,15 +291,16 @@ static bool is_outer_shown(const session_due_views *views, const char *mesh)
 }
 
 /* Finds the outer faces of the meshes whose outer surfaces are shown. Collective. */
-static insitu_status find_outer_cells(const session_pieces_basis *basis, const session_due_views *views,
-                                      const session_finer_choice *choices, base_error *error)
+static insitu_status find_cells_at_shown_outer_surfaces(const session_pieces_basis *basis,
+                                                        const session_due_views *views,
+                                                        const session_finer_choice *choices, base_error *error)
 {
     insitu_status status = INSITU_OK;
     if (basis->are_cells_changed) session_forget_outer_cells(basis->meshes);
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
         const char *name = basis->catalogue->meshes[m].name;
         const session_parts parts = session_find_parts(basis->meshes, name);
-        if (choices[m].order > 0 && !choices[m].excluded_count && is_outer_shown(views, name))
+        if (choices[m].order > 0 && !choices[m].excluded_count && is_outer_surface_shown(views, name))
             status = session_find_outer_cells(&parts, basis->team, error);
     }
     return status;
@@ -305,18 +310,20 @@ static insitu_status find_errors_of_all_meshes(const session_pieces_basis *basis
                                                session_finer_choice *choices, piece_error *errors,
                                                session_report *report, base_error *error)
 {
-    if (find_outer_cells(basis, views, choices, error)) return error->status;
-    fill_fields(basis, views);
+    if (find_cells_at_shown_outer_surfaces(basis, views, choices, error)) return error->status;
+    call_fill_functions_of_shown_fields(basis, views);
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].order > 0 && !choices[m].excluded_count)
             measure_or_choose_mesh(basis, views, m, &choices[m], &errors[m], report, error);
-    if (reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error)) return error->status;
-    return estimate_all_volumes(basis, views, choices, errors, error);
+    if (reduce_errors_over_ranks(errors, basis->catalogue->mesh_count, basis->team->comm, error)) return error->status;
+    return estimate_volume_errors_of_all_meshes(basis, views, choices, errors, error);
 }
 
 /* Selects the linear pieces to make in those meshes in which only some cells are refined. */
-static insitu_status list_pieces(const session_pieces_basis *basis, const session_due_views *views,
-                                 session_finer_choice *choices, piece_error *errors, base_error *error)
+static insitu_status select_pieces_of_partly_refined_meshes(const session_pieces_basis *basis,
+                                                            const session_due_views *views,
+                                                            session_finer_choice *choices, piece_error *errors,
+                                                            base_error *error)
 {
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].parts > 1 && choices[m].mark_count > 0)
@@ -333,7 +340,7 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
  * made, the mean displacement was at most 1/18 of the error bound, and the length at most 8 times the root of the area,
  * in pixels. With an error bound of 1/640 of the root of the area, less than 0.1 % of the surface's pixels are missed.
  */
-static double find_allowed_error(const scene *scene, const piece_error *of)
+static double compute_allowed_surface_error(const scene *scene, const piece_error *of)
 {
     static const double least_share = 0.25;
     const double hits = (double)of->all.area / 16;
@@ -350,7 +357,7 @@ static int choose_smallest_piece_count(const scene *scene, const session_finer_c
     enum { MOST_UNASKED = 2, MOST_FOR_VOLUMES = 8 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
     const int supported = session_find_max_edge_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
-    const double allowed = find_allowed_error(scene, of);
+    const double allowed = compute_allowed_surface_error(scene, of);
     int parts = 1;
     while (parts < MOST_FOR_VOLUMES && parts < supported && of->light_excess > parts * parts) parts++;
     while (parts < most && parts < supported && of->all.error > allowed * parts * parts) parts++;
@@ -381,8 +388,8 @@ static void choose_piece_count_by_error(const char *mesh, const scene *scene, co
         mesh, choice->parts, met, scene->surface_error);
 }
 
-static void warn_of_pyramids(const char *mesh, const scene *scene, const session_finer_choice *choice,
-                             session_report *report)
+static void warn_of_unrefined_pyramids(const char *mesh, const scene *scene, const session_finer_choice *choice,
+                                       session_report *report)
 {
     const bool is_asked = scene->finer_pieces || scene->is_surface_error_given;
     session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, is_asked && choice->excluded_count > 0,
@@ -395,14 +402,14 @@ static void warn_of_pyramids(const char *mesh, const scene *scene, const session
 /* ---- limit of the memory ----------------------------------------------------------------------------------------- */
 
 /* Returns the number of components of all fields of a mesh that images of the scene show. */
-static int count_components(const scene *scene, const session_catalogue_mesh *mesh)
+static int count_shown_field_components(const scene *scene, const session_catalogue_mesh *mesh)
 {
     int count = 0;
     for (int f = 0; f < mesh->field_count; f++) {
         bool is_shown = false;
         for (int i = 0; i < scene->image_count && !is_shown; i++) {
             scene_field_walk walk = {.image = &scene->images[i]};
-            for (const scene_field *field; !is_shown && (field = scene_next_field(&walk)) != NULL;)
+            for (const scene_field *field; !is_shown && (field = scene_find_next_field_of_layers(&walk)) != NULL;)
                 is_shown =
                     strcmp(field->name, mesh->fields[f].name) == 0 && scene_field_selects_mesh(field, mesh->name);
         }
@@ -427,7 +434,7 @@ typedef struct piece_step {
 } piece_step;
 
 /* Sorts steps by decreasing bytes; if bytes are equal, by mesh, and within a mesh by decreasing number of pieces. */
-static int compare_steps(const void *a, const void *b)
+static int compare_reductions_by_memory(const void *a, const void *b)
 {
     const piece_step *x = a, *y = b;
     if (x->bytes != y->bytes) return x->bytes > y->bytes ? -1 : 1;
@@ -437,8 +444,8 @@ static int compare_steps(const void *a, const void *b)
 /* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes. Of all meshes, the
  * mesh whose pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the
  * number of bytes before the reduction. */
-static double reduce_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
-                            session_finer_choice *choices)
+static double reduce_piece_counts_to_memory_limit(int mesh_count, double limit, const piece_error *errors,
+                                                  piece_step *steps, session_finer_choice *choices)
 {
     double all = 0;
     int count = 0;
@@ -448,7 +455,7 @@ static double reduce_pieces(int mesh_count, double limit, const piece_error *err
             steps[count++] = (piece_step){compute_finer_lattice_bytes(&errors[m], parts), m, parts};
     }
     if (!(all > limit)) return all;
-    qsort(steps, (size_t)count, sizeof *steps, compare_steps);
+    qsort(steps, (size_t)count, sizeof *steps, compare_reductions_by_memory);
     double sum = all;
     for (const piece_step *step = steps; step < steps + count && sum > limit; step++) {
         choices[step->mesh].parts = step->parts - 1;
@@ -457,11 +464,12 @@ static double reduce_pieces(int mesh_count, double limit, const piece_error *err
     return all;
 }
 
-static void limit_memory(const scene *scene, const session_catalogue *catalogue, const piece_error *errors,
-                         piece_step *steps, session_finer_choice *choices, session_report *report)
+static void limit_memory_of_refined_cells(const scene *scene, const session_catalogue *catalogue,
+                                          const piece_error *errors, piece_step *steps, session_finer_choice *choices,
+                                          session_report *report)
 {
-    const double all =
-        reduce_pieces(catalogue->mesh_count, scene->finer_memory * bytes_per_mib, errors, steps, choices);
+    const double all = reduce_piece_counts_to_memory_limit(catalogue->mesh_count, scene->finer_memory * bytes_per_mib,
+                                                           errors, steps, choices);
     for (int m = 0; m < catalogue->mesh_count; m++)
         session_warn(report, &(session_warning){WARNING_FINER, NULL, catalogue->meshes[m].name, 2},
                      choices[m].parts < errors[m].wanted,
@@ -473,8 +481,8 @@ static void limit_memory(const scene *scene, const session_catalogue *catalogue,
 
 /* ---- all meshes -------------------------------------------------------------------------------------------------- */
 
-static void report_pieces(const char *mesh, const session_finer_choice *choice, const piece_error *of,
-                          session_report *report)
+static void report_piece_count_and_error_bound(const char *mesh, const session_finer_choice *choice,
+                                               const piece_error *of, session_report *report)
 {
     char bound[100] = "without a bound", cells[160] = "", volumes[100] = "";
     if ((choice->parts > 1 || choice->is_completed || !choice->serendipity_count) && choice->order <= BOUND_MOST_ORDER)
@@ -498,25 +506,26 @@ static void choose_pieces_of_all_meshes(const session_pieces_basis *basis, piece
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const char *name = catalogue->meshes[m].name;
         if (!choices[m].order) continue;
-        warn_of_pyramids(name, scene, &choices[m], report);
+        warn_of_unrefined_pyramids(name, scene, &choices[m], report);
         if (scene->finer_pieces)
             choose_fixed_piece_count(name, scene, &errors[m], &choices[m], report);
         else
             choose_piece_count_by_error(name, scene, &errors[m], &choices[m], report);
-        errors[m].components = count_components(scene, &catalogue->meshes[m]);
+        errors[m].components = count_shown_field_components(scene, &catalogue->meshes[m]);
         errors[m].wanted = choices[m].parts;
     }
-    limit_memory(scene, catalogue, errors, steps, choices, report);
+    limit_memory_of_refined_cells(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
         /* a serendipity cell lacks some nodes of the complete cell of its order. The error bound is valid only if these
          * nodes are added */
         choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
-        if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
+        if (errors[m].is_shown)
+            report_piece_count_and_error_bound(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }
 }
 
-insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
-                                    session_report *report, base_error *error)
+insitu_status session_choose_higher_order_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
+                                                 session_report *report, base_error *error)
 {
     const size_t count = (size_t)basis->catalogue->mesh_count + 1;
     piece_error *errors = base_calloc(count, sizeof *errors);
@@ -527,10 +536,11 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
                                 "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status)
-        status = session_make_due_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
+        status = session_compute_cameras_of_due_images(basis->scene, basis->moment, basis->meshes, basis->team->comm,
+                                                       &views, error);
     if (!status) status = find_errors_of_all_meshes(basis, &views, choices, errors, report, error);
     if (!status) choose_pieces_of_all_meshes(basis, errors, steps, choices, report);
-    if (!status) status = list_pieces(basis, &views, choices, errors, error);
+    if (!status) status = select_pieces_of_partly_refined_meshes(basis, &views, choices, errors, error);
     session_free_due_views(&views);
     base_free(errors);
     base_free(steps);

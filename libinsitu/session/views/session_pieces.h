@@ -21,7 +21,7 @@ typedef struct session_pieces_basis {
  * would take more memory than the scene's finer_memory. Calls fill functions of fields that isosurfaces and volumes
  * show. Adds the chosen numbers to the report. choices: results of session_count_higher_order_cells(), one per mesh of
  * the catalogue. Collective; all ranks return the same status. */
-insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
-                                    session_report *report, base_error *error);
+insitu_status session_choose_higher_order_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
+                                                 session_report *report, base_error *error);
 
 #endif

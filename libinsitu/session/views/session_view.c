@@ -38,7 +38,7 @@ static const double finest_step = 4e-6;
 
 /* Returns the distance between samples in scene units. If no cell has a volume, a hundredth of the diagonal is used
  * instead of the size of cells. */
-static double sample_distance(const session_extent *extent, const scene_image *image)
+static double compute_sample_distance(const session_extent *extent, const scene_image *image)
 {
     if (image->step > 0) return image->step;
     const double cell = extent->cell_size > 0 ? extent->cell_size : extent->half_diagonal / 50;
@@ -48,13 +48,13 @@ static double sample_distance(const session_extent *extent, const scene_image *i
 
 /* Returns the radius of ambient occlusion, which by default is a tenth of the diagonal. If the diagonal is 0, the
  * radius has no effect. */
-static double occlusion_radius(const session_extent *extent, const scene_image *image)
+static double get_ambient_occlusion_radius(const session_extent *extent, const scene_image *image)
 {
     if (image->occlusion_radius > 0) return image->occlusion_radius;
     return extent->half_diagonal > 0 ? extent->half_diagonal / 5 : 1;
 }
 
-static void fill_view(const session_space *space, const scene_image *image, session_view *out)
+static void set_rendering_parameters(const session_space *space, const scene_image *image, session_view *out)
 {
     out->space.scale = space->scale;
     for (int axis = 0; axis < 3; axis++) {
@@ -64,8 +64,8 @@ static void fill_view(const session_space *space, const scene_image *image, sess
     make_lights(image, &out->camera, out->lights);
     out->occlusion.lights = image->shadows;
     out->occlusion.samples = image->occlusion_samples;
-    out->occlusion.radius = occlusion_radius(&space->extent, image);
-    out->step = sample_distance(&space->extent, image);
+    out->occlusion.radius = get_ambient_occlusion_radius(&space->extent, image);
+    out->step = compute_sample_distance(&space->extent, image);
 }
 
 /* ---- time that samples take ---------------------------------------------------------------------------------- */
@@ -75,7 +75,7 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 static const double sample_seconds = 1e-7;
 
 /* Returns the length of the part of a pixel's ray that lies within the bounds. */
-static double measure_chord_in_bounds(const session_extent *e, const render_camera *camera, int x, int y)
+static double compute_ray_length_in_bounds(const session_extent *e, const render_camera *camera, int x, int y)
 {
     double base[3], direction[3], begin = 0, end = INFINITY;
     render_camera_ray(camera, x, y, base, direction);
@@ -92,7 +92,7 @@ static double measure_chord_in_bounds(const session_extent *e, const render_came
 
 /* Estimates the number of samples that all ranks compute, under the assumption that cells fill the bounds and no sample
  * is hidden. */
-static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
+static double estimate_total_sample_count(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
     const render_camera *camera = &view->camera;
@@ -101,7 +101,7 @@ static double estimate_samples(const session_extent *e, const scene_image *image
         const int column = i % PROBES, row = i / PROBES;
         const int x = (int)((column + 0.5) * camera->width / PROBES);
         const int y = (int)((row + 0.5) * camera->height / PROBES);
-        sum += measure_chord_in_bounds(e, camera, x, y);
+        sum += compute_ray_length_in_bounds(e, camera, x, y);
     }
     const double rays = (double)image->width * image->height * image->frames;
     return sum / (PROBES * PROBES) / view->step * rays * image->volume_count;
@@ -111,7 +111,7 @@ static insitu_status check_sampling_time(const session_extent *e, const char *sc
                                          const session_view *view, int threads, base_error *error)
 {
     if (image->volume_count == 0 || image->method != SCENE_SAMPLES || e->rank_count == 0) return INSITU_OK;
-    const double samples = estimate_samples(e, image, view);
+    const double samples = estimate_total_sample_count(e, image, view);
     const double seconds = samples * sample_seconds / ((double)threads * e->rank_count);
     if (!(seconds > image->max_seconds)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_SCENE,
@@ -131,7 +131,7 @@ typedef struct corner_bounds {
     bool is_beside;   /* set if all corners are outside of the picture, beyond the same border */
 } corner_bounds;
 
-static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
+static corner_bounds project_corners_of_bounds(const session_extent *e, const render_camera *c)
 {
     corner_bounds b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, 0, false};
     int beyond[4] = {0, 0, 0, 0};
@@ -155,9 +155,9 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
 }
 
 /* Returns the reason why the camera can see no data; NULL if some data may be in view. */
-static const char *find_unseen_reason(const session_extent *e, const render_camera *c)
+static const char *describe_why_data_is_out_of_view(const session_extent *e, const render_camera *c)
 {
-    const corner_bounds b = project_bounds(e, c);
+    const corner_bounds b = project_corners_of_bounds(e, c);
     if (b.behind_count == 8) return "they are behind it";
     if (b.is_beside) return "they are beside the picture";
     const bool is_small =
@@ -165,10 +165,10 @@ static const char *find_unseen_reason(const session_extent *e, const render_came
     return is_small ? "together they are smaller than a pixel" : NULL;
 }
 
-static void warn_of_view(const session_extent *e, const scene_image *image, const session_view *view,
-                         session_report *report)
+static void warn_if_data_is_out_of_view(const session_extent *e, const scene_image *image, const session_view *view,
+                                        session_report *report)
 {
-    const char *why = e->cell_count ? find_unseen_reason(e, &view->camera) : NULL;
+    const char *why = e->cell_count ? describe_why_data_is_out_of_view(e, &view->camera) : NULL;
     const session_warning warning = {WARNING_VIEW, image->name, NULL, image->variant.view};
     session_warn(report, &warning, why != NULL,
                  "image \"%s\": its camera does not see the cells, which lie between (%g, %g, %g) and (%g, %g, %g): %s",
@@ -184,11 +184,11 @@ insitu_status session_make_view(const session_space *space, const char *scene_pa
     *out = (session_view){0};
     const insitu_status status = make_camera(&space->extent, scene_path, image, &out->camera, error);
     if (status) return status;
-    fill_view(space, image, out);
+    set_rendering_parameters(space, image, out);
     out->clip_count = image->clip_count;
     session_make_clips(&space->extent, image, out->clips);
-    session_warn_of_clips(&space->extent, image, out->clips, report);
+    session_warn_of_layers_clipped_away(&space->extent, image, out->clips, report);
     if (check_sampling_time(&space->extent, scene_path, image, out, team->threads, error) == INSITU_OK)
-        warn_of_view(&space->extent, image, out, report);
+        warn_if_data_is_out_of_view(&space->extent, image, out, report);
     return INSITU_OK;
 }

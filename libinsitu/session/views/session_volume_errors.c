@@ -88,7 +88,7 @@ static bool is_same_field(const scene_field *a, const scene_field *b)
     return true;
 }
 
-static session_value_range *find_range(const session_value_ranges *ranges, const scene_field *field)
+static session_value_range *find_value_range_of_field(const session_value_ranges *ranges, const scene_field *field)
 {
     for (int i = 0; i < ranges->count; i++)
         if (is_same_field(ranges->items[i].field, field)) return &ranges->items[i];
@@ -97,7 +97,7 @@ static session_value_range *find_range(const session_value_ranges *ranges, const
 
 /* Lists the fields whose ranges are needed: fields of volumes without a fixed range. Returns false if memory runs
  * out. */
-static bool list_ranges(const scene *scene, const session_due_views *views, session_value_ranges *out)
+static bool list_fields_that_need_ranges(const scene *scene, const session_due_views *views, session_value_ranges *out)
 {
     size_t most = 1;
     for (int i = 0; i < views->count; i++) most += (size_t)scene->images[i].volume_count;
@@ -105,7 +105,7 @@ static bool list_ranges(const scene *scene, const session_due_views *views, sess
     for (int i = 0; i < views->count && out->items; i++)
         for (int layer = 0; views->are_due[i] && layer < scene->images[i].volume_count; layer++) {
             const scene_volume *volume = &scene->images[i].volumes[layer];
-            if (!volume->colour_map.range.is_fixed && !find_range(out, &volume->field))
+            if (!volume->colour_map.range.is_fixed && !find_value_range_of_field(out, &volume->field))
                 out->items[out->count++] = (session_value_range){&volume->field, -INFINITY, -INFINITY};
         }
     return out->items != NULL;
@@ -118,7 +118,7 @@ typedef struct range_work {
     session_value_range *range;
 } range_work;
 
-static insitu_status extend_range(void *of, const session_node_values *values, base_error *error)
+static insitu_status extend_range_by_node_values(void *of, const session_node_values *values, base_error *error)
 {
     const range_work *work = of;
     const session_deviation_request request = {
@@ -134,13 +134,15 @@ static insitu_status extend_range(void *of, const session_node_values *values, b
     return error->status;
 }
 
-static void find_own_range(const session_meshes *meshes, int threads, session_value_range *range, base_error *error)
+static void find_value_range_on_this_rank(const session_meshes *meshes, int threads, session_value_range *range,
+                                          base_error *error)
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         range_work work = {meshes->items[m], threads, range};
         const bool is_shown = scene_field_selects_mesh(range->field, work.mesh->label);
         const int field = is_shown ? session_find_field(work.mesh, range->field->name) : -1;
-        if (field >= 0 && !work.mesh->source) session_pass_node_values(work.mesh, field, extend_range, &work, error);
+        if (field >= 0 && !work.mesh->source)
+            session_pass_node_values(work.mesh, field, extend_range_by_node_values, &work, error);
     }
 }
 
@@ -149,12 +151,13 @@ insitu_status session_find_volume_ranges(const scene *scene, const session_due_v
                                          session_value_ranges *out, base_error *error)
 {
     *out = (session_value_ranges){0};
-    if (!list_ranges(scene, views, out)) session_fail_for_memory(error, sizeof *out->items, "ranges of volumes");
+    if (!list_fields_that_need_ranges(scene, views, out))
+        session_fail_for_memory(error, sizeof *out->items, "ranges of volumes");
     if (session_agree(team->comm, error)) return error->status;
     double *ends = base_alloc(((size_t)out->count + 1) * 2 * sizeof *ends);
     if (!ends) session_fail_for_memory(error, (int64_t)sizeof *ends * 2 * out->count, "ranges of volumes");
     for (int i = 0; i < out->count; i++) {
-        find_own_range(meshes, team->threads, &out->items[i], error);
+        find_value_range_on_this_rank(meshes, team->threads, &out->items[i], error);
         if (ends) memcpy(ends + 2 * i, (const double[]){out->items[i].minus_low, out->items[i].high}, 2 * sizeof *ends);
     }
     insitu_status status = session_agree(team->comm, error);
@@ -177,7 +180,7 @@ void session_free_volume_ranges(session_value_ranges *ranges)
 
 /* ---- transfer functions ------------------------------------------------------------------------------------------ */
 
-static double find_position_in_range(const render_transfer *t, double value)
+static double compute_position_in_range(const render_transfer *t, double value)
 {
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
@@ -185,21 +188,21 @@ static double find_position_in_range(const render_transfer *t, double value)
     return fmin(fmax(at, -1), 2); /* limited, because values that are not positive have no logarithm */
 }
 
-static double find_extinction(const render_transfer *t, double position)
+static double compute_extinction_at_position(const render_transfer *t, double position)
 {
     int i = 0;
-    while (i < t->opacity_count && find_position_in_range(t, t->opacity_values[i]) <= position) i++;
+    while (i < t->opacity_count && compute_position_in_range(t, t->opacity_values[i]) <= position) i++;
     double opacity = (double)t->opacities[i < t->opacity_count ? i : i - 1];
     if (i > 0 && i < t->opacity_count) {
-        const double from = find_position_in_range(t, t->opacity_values[i - 1]),
-                     to = find_position_in_range(t, t->opacity_values[i]);
+        const double from = compute_position_in_range(t, t->opacity_values[i - 1]),
+                     to = compute_position_in_range(t, t->opacity_values[i]);
         const double share = (position - from) / (to - from), before = (double)t->opacities[i - 1];
         opacity = before + share * (opacity - before);
     }
     return (opacity < 1 ? fmin(-log1p(-opacity), largest_extinction) : largest_extinction) / t->unit_distance;
 }
 
-static void find_colour(const render_transfer *t, double position, double out[3])
+static void interpolate_colour_at_position(const render_transfer *t, double position, double out[3])
 {
     const double at = fmin(fmax(position, 0), 1) * (t->colour_count - 1);
     const int i = at < t->colour_count - 2 ? (int)at : t->colour_count - 2;
@@ -211,12 +214,13 @@ static void find_colour(const render_transfer *t, double position, double out[3]
 
 /* Integrates the transfer function from the position `from` in the range of values to the position `to`. The integrals
  * are added to `before`, which are those up to `from`; the result `after` contains those up to `to`. */
-static void integrate_step(const render_transfer *t, double from, double to, const double *before, double *after)
+static void integrate_transfer_over_interval(const render_transfer *t, double from, double to, const double *before,
+                                             double *after)
 {
-    const double extinctions[2] = {find_extinction(t, from), find_extinction(t, to)};
+    const double extinctions[2] = {compute_extinction_at_position(t, from), compute_extinction_at_position(t, to)};
     double colours[2][3];
-    find_colour(t, from, colours[0]);
-    find_colour(t, to, colours[1]);
+    interpolate_colour_at_position(t, from, colours[0]);
+    interpolate_colour_at_position(t, to, colours[1]);
     for (int c = 0; c < 3; c++) {
         const double change = colours[1][c] * extinctions[1] - colours[0][c] * extinctions[0];
         const double emission = 0.5 * (colours[1][c] * extinctions[1] + colours[0][c] * extinctions[0]);
@@ -228,22 +232,24 @@ static void integrate_step(const render_transfer *t, double from, double to, con
 }
 
 /* Fills the table of the integrals over the range of values, and their slopes outside of the range. */
-static void integrate_transfer(const render_transfer *t, volume_errors *out)
+static void tabulate_transfer_integrals(const render_transfer *t, volume_errors *out)
 {
     static const double none[QUANTITIES];
     memset(out->integrals[0], 0, sizeof out->integrals[0]);
     for (int i = 0; i < POSITIONS; i++)
-        integrate_step(t, (double)i / POSITIONS, (i + 1.0) / POSITIONS, out->integrals[i], out->integrals[i + 1]);
-    integrate_step(t, -2, -1, none, out->slopes[0]);
-    integrate_step(t, 2, 3, none, out->slopes[1]);
+        integrate_transfer_over_interval(t, (double)i / POSITIONS, (i + 1.0) / POSITIONS, out->integrals[i],
+                                         out->integrals[i + 1]);
+    integrate_transfer_over_interval(t, -2, -1, none, out->slopes[0]);
+    integrate_transfer_over_interval(t, 2, 3, none, out->slopes[1]);
 }
 
 /* Begins the estimate for a volume. Returns false if memory runs out; the caller must end the estimate in any case. */
-static bool begin_estimate(const session_error_request *request, const session_value_ranges *ranges, volume_errors *out)
+static bool prepare_volume_error_estimate(const session_error_request *request, const session_value_ranges *ranges,
+                                          volume_errors *out)
 {
     const scene_volume *volume = request->volume;
     const scene_range *fixed = &volume->colour_map.range;
-    const session_value_range *found = fixed->is_fixed ? NULL : find_range(ranges, &volume->field);
+    const session_value_range *found = fixed->is_fixed ? NULL : find_value_range_of_field(ranges, &volume->field);
     double low = found ? -found->minus_low : fixed->low, high = found ? found->high : fixed->high;
     *out = (volume_errors){.request = request};
     if (found && fixed->source == SCENE_RANGE_SYMMETRIC) {
@@ -261,11 +267,11 @@ static bool begin_estimate(const session_error_request *request, const session_v
     if (!session_make_transfer(request->views->extent.half_diagonal, &volume->colour_map, low, high, volume,
                                &out->transfer))
         return false;
-    integrate_transfer(&out->transfer.transfer, out);
+    tabulate_transfer_integrals(&out->transfer.transfer, out);
     return true;
 }
 
-static void end_estimate(volume_errors *errors)
+static void free_volume_error_estimate(volume_errors *errors)
 {
     session_transfer_free(&errors->transfer);
     base_free(errors->views);
@@ -277,7 +283,7 @@ static void end_estimate(volume_errors *errors)
 /* ---- contributions of cells to the estimate ---------------------------------------------------------------------- */
 
 /* Returns the integral of a quantity from the low end of the range of values (position 0) to a position. */
-static double find_integral_at(const volume_errors *of, int quantity, double position)
+static double interpolate_transfer_integral(const volume_errors *of, int quantity, double position)
 {
     if (position <= 0) return position * of->slopes[0][quantity];
     if (position >= 1) return of->integrals[POSITIONS][quantity] + (position - 1) * of->slopes[1][quantity];
@@ -291,7 +297,8 @@ static double find_integral_at(const volume_errors *of, int quantity, double pos
  * over the cell of the bracketed factor in the formula at the top of this file, times the root mean square of the error
  * of the cell's values. For the other quantities, it is their mean over the cell. All values between the cell's
  * smallest and largest one are assumed to be equally frequent. */
-static void find_light_per_length(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
+static void compute_ray_integrals_per_unit_length(const volume_errors *of, const session_value_cell *cell,
+                                                  double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
     const render_transfer *t = &of->transfer.transfer;
@@ -301,9 +308,10 @@ static void find_light_per_length(const volume_errors *of, const session_value_c
         low = fmin(low, cell->tuples[n][3] - error);
         high = fmax(high, cell->tuples[n][3] + error);
     }
-    const double from = find_position_in_range(t, low) - least_width,
-                 to = find_position_in_range(t, high) + least_width;
-    for (int q = 0; q < QUANTITIES; q++) out[q] = find_integral_at(of, q, to) - find_integral_at(of, q, from);
+    const double from = compute_position_in_range(t, low) - least_width,
+                 to = compute_position_in_range(t, high) + least_width;
+    for (int q = 0; q < QUANTITIES; q++)
+        out[q] = interpolate_transfer_integral(of, q, to) - interpolate_transfer_integral(of, q, from);
     for (int q = EMISSION; q < QUANTITIES; q++) out[q] /= to - from;
     for (int q = 0; q < EMISSION; q++) out[q] *= error > 0 ? error / (high - low) : 0;
 }
@@ -317,7 +325,7 @@ typedef struct covered_part {
 /* Finds the part of the grid that a cell of the mesh covers. If the cell's distance from the eye along the camera's
  * axis is smaller than the cell's radius, the distance is taken to be the radius. Returns false if the cell is behind
  * the eye. */
-static bool project_cell(const render_camera *camera, const session_value_cell *cell, covered_part *out)
+static bool project_cell_onto_pixel_grid(const render_camera *camera, const session_value_cell *cell, covered_part *out)
 {
     const double half[2] = {camera->half_height * camera->width / camera->height, camera->half_height};
     const double radius = cell->bound->radius;
@@ -344,13 +352,13 @@ static bool project_cell(const render_camera *camera, const session_value_cell *
     return true;
 }
 
-static double find_covered_share(const covered_part *part, int axis, int at)
+static double compute_covered_fraction(const covered_part *part, int axis, int at)
 {
     const double width = part->high[axis] - part->low[axis];
     return (fmin(part->high[axis], at + 1) - fmax(part->low[axis], at)) / width;
 }
 
-static void add_sum(int64_t *sum, double value)
+static void add_atomically_in_fixed_point(int64_t *sum, double value)
 {
     const int64_t more = (int64_t)llrint(fmin(value, most_of_cell) / sum_unit);
 #pragma omp atomic
@@ -358,15 +366,15 @@ static void add_sum(int64_t *sum, double value)
 }
 
 /* Adds the contributions of a cell of the mesh to the estimate `of`, which is a volume_errors. */
-static void add_cell(void *of, const session_value_cell *cell)
+static void add_volume_error_of_cell(void *of, const session_value_cell *cell)
 {
     enum { LAST = GRID_SIZE - 1 };
     const volume_errors *errors = of;
     double light[QUANTITIES];
-    find_light_per_length(errors, cell, light);
+    compute_ray_integrals_per_unit_length(errors, cell, light);
     for (int v = 0; v < errors->view_count; v++) {
         covered_part part;
-        if (!project_cell(&errors->request->views->cameras[errors->views[v]], cell, &part)) continue;
+        if (!project_cell_onto_pixel_grid(&errors->request->views->cameras[errors->views[v]], cell, &part)) continue;
         const double length = cell->bound->volume / part.area;
         for (int a = 0; a < 2; a++) part.high[a] = fmax(part.high[a], part.low[a] + 1e-6);
         int first[2], last[2];
@@ -376,15 +384,16 @@ static void add_cell(void *of, const session_value_cell *cell)
         }
         for (int j = first[1]; j <= last[1]; j++)
             for (int i = first[0]; i <= last[0]; i++) {
-                const double share = length * find_covered_share(&part, 0, i) * find_covered_share(&part, 1, j);
+                const double share =
+                    length * compute_covered_fraction(&part, 0, i) * compute_covered_fraction(&part, 1, j);
                 int64_t *sums = errors->sums + QUANTITIES * ((v * GRID_SIZE + j) * GRID_SIZE + i);
-                for (int q = 0; q < QUANTITIES; q++) add_sum(&sums[q], share * light[q]);
+                for (int q = 0; q < QUANTITIES; q++) add_atomically_in_fixed_point(&sums[q], share * light[q]);
             }
     }
 }
 
 /* Returns the estimated error of the worst pixels in a cell of a picture's grid, the largest of the three channels. */
-static double find_pixel_error(const int64_t sums[QUANTITIES], const float background[4])
+static double compute_error_of_worst_pixel(const int64_t sums[QUANTITIES], const float background[4])
 {
     const double depth = (double)sums[EXTINCTION] * sum_unit, through = exp(-depth);
     const double share = depth > 1e-6 ? -expm1(-depth) / depth : 1; /* mean transmittance along the ray */
@@ -397,14 +406,14 @@ static double find_pixel_error(const int64_t sums[QUANTITIES], const float backg
     return worst_pixel * most;
 }
 
-static double find_largest_pixel_error(const volume_errors *errors)
+static double find_largest_error_of_views(const volume_errors *errors)
 {
     const int64_t of_view = errors->sum_count / (errors->view_count > 0 ? errors->view_count : 1);
     double most = 0;
     for (int v = 0; v < errors->view_count; v++) {
         const scene_image *image = &errors->request->views->scene->images[errors->views[v]];
         for (int64_t i = 0; i < of_view; i += QUANTITIES)
-            most = fmax(most, find_pixel_error(errors->sums + v * of_view + i, image->background));
+            most = fmax(most, compute_error_of_worst_pixel(errors->sums + v * of_view + i, image->background));
     }
     return most;
 }
@@ -419,13 +428,13 @@ typedef struct estimate_work {
     volume_errors *errors;
 } estimate_work;
 
-static insitu_status add_cells(void *of, const session_node_values *values, base_error *error)
+static insitu_status add_volume_errors_of_cells(void *of, const session_node_values *values, base_error *error)
 {
     const estimate_work *work = of;
     const session_deviation_request request = {.values = values,
                                                .component = work->errors->request->component,
                                                .is_of_values = true,
-                                               .use_cell = add_cell,
+                                               .use_cell = add_volume_error_of_cell,
                                                .of_values = work->errors,
                                                .is_lobatto = work->is_lobatto};
     session_deviation unused = {.low = INFINITY, .high = -INFINITY};
@@ -437,18 +446,20 @@ insitu_status session_estimate_volume_error(const session_error_request *request
                                             double *out, base_error *error)
 {
     volume_errors errors;
-    if (!begin_estimate(request, ranges, &errors)) session_fail_for_memory(error, sizeof errors, "errors of volumes");
+    if (!prepare_volume_error_estimate(request, ranges, &errors))
+        session_fail_for_memory(error, sizeof errors, "errors of volumes");
     for (int i = 0; i < parts->count && !error->status; i++) {
         estimate_work work = {parts->items[i], team->threads, is_lobatto, &errors};
         const int field = session_find_field(work.mesh, request->field);
-        if (work.mesh->is_given && field >= 0) session_pass_node_values(work.mesh, field, add_cells, &work, error);
+        if (work.mesh->is_given && field >= 0)
+            session_pass_node_values(work.mesh, field, add_volume_errors_of_cells, &work, error);
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status)
         status = session_check_mpi(
             error, MPI_Allreduce(MPI_IN_PLACE, errors.sums, (int)errors.sum_count, MPI_INT64_T, MPI_SUM, team->comm),
             "MPI_Allreduce");
-    if (!status) *out = find_largest_pixel_error(&errors);
-    end_estimate(&errors);
+    if (!status) *out = find_largest_error_of_views(&errors);
+    free_volume_error_estimate(&errors);
     return status;
 }

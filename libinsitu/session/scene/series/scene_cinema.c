@@ -14,7 +14,7 @@ static const char *find_control_character(const char *text)
     return NULL;
 }
 
-static insitu_status check_folder(const scene_document *d, const char *path, const char *folder)
+static insitu_status check_database_folder_name(const scene_document *d, const char *path, const char *folder)
 {
     const size_t length = strlen(folder);
     if (length < 5 || strcmp(folder + length - 4, ".cdb") != 0 || folder[length - 5] == '/')
@@ -28,7 +28,8 @@ static insitu_status check_folder(const scene_document *d, const char *path, con
                : INSITU_OK;
 }
 
-static insitu_status check_file(const scene_document *d, const char *path, const scene_image *image, const char *file)
+static insitu_status check_file_name_in_database(const scene_document *d, const char *path, const scene_image *image,
+                                                 const char *file)
 {
     if (file && (file[0] == '/' || strncmp(file, "../", 3) == 0 || strstr(file, "/../")))
         return scene_fail_at_key(d, path, "path", "\"%.100s\" is not below the folder, expected a file in the database",
@@ -66,8 +67,8 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
     const char *folder = in->cinema;
     /* removes "./", so that folders that are written differently in the scene, but are the same, have one table */
     while (strncmp(folder, "./", 2) == 0) folder += 2;
-    insitu_status status = check_folder(d, path, folder);
-    if (!status) status = check_file(d, path, image, in->path);
+    insitu_status status = check_database_folder_name(d, path, folder);
+    if (!status) status = check_file_name_in_database(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
         status = scene_fail_at_key(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
     return status ? status
@@ -76,7 +77,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 
 /* ---- databases ------------------------------------------------------------------------------------------------- */
 
-static bool is_in_folder(const scene_output *output, const char *folder)
+static bool is_output_in_folder(const scene_output *output, const char *folder)
 {
     const size_t length = strlen(folder);
     return output->folder_bytes == (int)length + 1 && strncmp(output->path, folder, length) == 0;
@@ -84,10 +85,10 @@ static bool is_in_folder(const scene_output *output, const char *folder)
 
 /* Returns the index of the database with the output's folder. If there is none yet, it is added. Returns -1 if memory
  * runs out. */
-static int find_database(scene *s, const scene_image *image, const scene_output *output)
+static int find_or_add_database(scene *s, const scene_image *image, const scene_output *output)
 {
     for (int i = 0; i < s->database_count; i++)
-        if (is_in_folder(output, s->databases[i].path)) return i;
+        if (is_output_in_folder(output, s->databases[i].path)) return i;
     scene_database *items = base_realloc(s->databases, (size_t)(s->database_count + 1) * sizeof *items);
     if (!items) return -1;
     s->databases = items;
@@ -112,7 +113,7 @@ static insitu_status add_output_to_database(const scene_document *d, scene *s, s
     scene_output *output = &image->outputs[index];
     output->database = -1;
     if (output->folder_bytes == 0) return INSITU_OK;
-    output->database = find_database(s, image, output);
+    output->database = find_or_add_database(s, image, output);
     if (output->database < 0) return scene_fail_for_memory(d);
     set_database_columns(&s->databases[output->database], image);
     for (int i = 0; i < index; i++) {
@@ -125,7 +126,7 @@ static insitu_status add_output_to_database(const scene_document *d, scene *s, s
     return INSITU_OK;
 }
 
-insitu_status scene_find_databases(const scene_document *d, scene *s)
+insitu_status scene_assign_outputs_to_databases(const scene_document *d, scene *s)
 {
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count; i++)

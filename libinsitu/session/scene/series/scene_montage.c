@@ -14,11 +14,11 @@ static char *expand_path_for_comparison(const scene_image *image, const scene_ou
 {
     scene_placeholder_values moment = scene_make_placeholder_values(image, 123456789012345678, 0.5);
     moment.view = view;
-    return scene_expand(output->path, &moment);
+    return scene_expand_placeholders(output->path, &moment);
 }
 
-static insitu_status check_views(const scene_document *d, const char *path, const scene_image *image,
-                                 const scene_output *output, const char *name)
+static insitu_status check_views_share_one_file(const scene_document *d, const char *path, const scene_image *image,
+                                                const scene_output *output, const char *name)
 {
     char *other = expand_path_for_comparison(image, output, 1);
     if (!other) return scene_fail_for_memory(d);
@@ -81,8 +81,8 @@ static bool has_insets(const scene_montage *m)
     return has;
 }
 
-static insitu_status check_panels(const scene_document *d, const char *path, const scene_image *image,
-                                  const scene_output *output, const scene_montage *m)
+static insitu_status check_panels_fit_montage(const scene_document *d, const char *path, const scene_image *image,
+                                              const scene_output *output, const scene_montage *m)
 {
     if (output->columns != m->columns || output->rows != m->rows)
         return scene_fail_at_key(d, path, "grid",
@@ -121,7 +121,7 @@ static scene_rectangle compute_inset_rectangle(const scene_montage *m, scene_anc
 }
 
 /* Returns whether an inset and its frame overlap another inset of the file or its frame. */
-static bool overlaps_another(const scene_montage *m, const scene_rectangle *a)
+static bool does_inset_overlap_another(const scene_montage *m, const scene_rectangle *a)
 {
     const int frames = 2 * m->frame_width;
     bool overlaps = false;
@@ -133,8 +133,8 @@ static bool overlaps_another(const scene_montage *m, const scene_rectangle *a)
     return overlaps;
 }
 
-static insitu_status check_inset(const scene_document *d, const char *path, const scene_image *image,
-                                 const scene_output *output, const scene_montage *m)
+static insitu_status check_inset_fits_montage(const scene_document *d, const char *path, const scene_image *image,
+                                              const scene_output *output, const scene_montage *m)
 {
     const scene_rectangle own = compute_inset_rectangle(m, output->corner, image);
     const int most_width = m->width * m->columns - 2 * m->inset_margin;
@@ -148,7 +148,7 @@ static insitu_status check_inset(const scene_document *d, const char *path, cons
     if (image->width > most_width || image->height > most_height)
         return scene_fail_at_key(d, path, "inset", "this picture has %d x %d pixels, expected at most %d x %d",
                                  image->width, image->height, most_width, most_height);
-    if (overlaps_another(m, &own))
+    if (does_inset_overlap_another(m, &own))
         return scene_fail_at_key(d, path, "inset",
                                  "this picture has %d x %d pixels and overlaps another inset of the file, expected "
                                  "smaller pictures",
@@ -157,8 +157,8 @@ static insitu_status check_inset(const scene_document *d, const char *path, cons
 }
 
 /* Places an inset over the panels of the montage of this name. */
-static insitu_status add_inset(const scene_document *d, const char *path, scene *s, const scene_image *image,
-                               scene_output *output, const char *name)
+static insitu_status add_inset_to_montage(const scene_document *d, const char *path, scene *s, const scene_image *image,
+                                          scene_output *output, const char *name)
 {
     const int index = find_montage(s, name);
     if (index < 0)
@@ -167,7 +167,7 @@ static insitu_status add_inset(const scene_document *d, const char *path, scene 
                                  "(grid: [1, 1] for a single picture)",
                                  output->path);
     scene_montage *m = &s->montages[index];
-    const insitu_status status = check_inset(d, path, image, output, m);
+    const insitu_status status = check_inset_fits_montage(d, path, image, output, m);
     if (status) return status;
     output->montage = index;
     output->first_panel = m->columns * m->rows;
@@ -177,12 +177,12 @@ static insitu_status add_inset(const scene_document *d, const char *path, scene 
 
 /* Places a picture, or all views of an orbit, in the next panels of the montage of this name. Takes ownership of the
  * name. */
-static insitu_status add_panels(const scene_document *d, const char *path, scene *s, const scene_image *image,
-                                scene_output *output, char *name)
+static insitu_status add_panels_to_montage(const scene_document *d, const char *path, scene *s,
+                                           const scene_image *image, scene_output *output, char *name)
 {
     const int views =
         image->camera.orbit.view_count ? image->camera.orbit.view_count * image->camera.orbit.circle_count : 1;
-    const insitu_status status = views > 1 ? check_views(d, path, image, output, name) : INSITU_OK;
+    const insitu_status status = views > 1 ? check_views_share_one_file(d, path, image, output, name) : INSITU_OK;
     if (status) {
         base_free(name);
         return status;
@@ -192,7 +192,7 @@ static insitu_status add_panels(const scene_document *d, const char *path, scene
     scene_montage *m = &s->montages[output->montage];
     output->first_panel = m->panel_count;
     m->panel_count += views;
-    return check_panels(d, path, image, output, m);
+    return check_panels_fit_montage(d, path, image, output, m);
 }
 
 static insitu_status add_output_to_montage(const scene_document *d, scene *s, scene_image *image, int index)
@@ -204,13 +204,13 @@ static insitu_status add_output_to_montage(const scene_document *d, scene *s, sc
     char *name = expand_path_for_comparison(image, output, 0);
     if (!name) return scene_fail_for_memory(d);
     snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
-    if (!output->is_inset) return add_panels(d, path, s, image, output, name);
-    const insitu_status status = add_inset(d, path, s, image, output, name);
+    if (!output->is_inset) return add_panels_to_montage(d, path, s, image, output, name);
+    const insitu_status status = add_inset_to_montage(d, path, s, image, output, name);
     base_free(name);
     return status;
 }
 
-insitu_status scene_find_montages(const scene_document *d, scene *s)
+insitu_status scene_assign_outputs_to_montages(const scene_document *d, scene *s)
 {
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++)

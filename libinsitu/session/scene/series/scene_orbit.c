@@ -10,7 +10,7 @@
 /* Finds the directions perpendicular to the axis at phi = 0 and 90 degrees. If a is the coordinate axis nearest to the
  * orbit's axis, the first direction is as close as possible to the coordinate axis that follows a (x -> y -> z -> x).
  * For an axis along z, phi is the longitude of spherical coordinates. */
-static void find_perpendiculars(const double axis[3], double first[3], double second[3])
+static void compute_perpendicular_directions(const double axis[3], double first[3], double second[3])
 {
     int nearest = 0;
     for (int a = 1; a < 3; a++)
@@ -29,7 +29,7 @@ void scene_set_orbit_view(scene_camera *camera, int view)
     static const double degree = 3.14159265358979323846 / 180;
     const scene_orbit *o = &camera->orbit;
     double first[3], second[3];
-    find_perpendiculars(o->axis, first, second);
+    compute_perpendicular_directions(o->axis, first, second);
     camera->phi = o->start + 360.0 * (view % o->view_count) / o->view_count;
     camera->theta = o->elevations[view / o->view_count];
     const double phi = camera->phi * degree, theta = camera->theta * degree;
@@ -37,34 +37,36 @@ void scene_set_orbit_view(scene_camera *camera, int view)
         camera->direction[a] = cos(theta) * (cos(phi) * first[a] + sin(phi) * second[a]) + sin(theta) * o->axis[a];
 }
 
-static int count_circles(const scene_document *d, const char *path, char elevation[SCENE_PATH_SIZE])
+static int count_elevations_of_orbit(const scene_document *d, const char *path, char elevation[SCENE_PATH_SIZE])
 {
     snprintf(elevation, SCENE_PATH_SIZE, "%s.orbit.elevation", path);
-    const int count = scene_document_length(d, elevation);
+    const int count = scene_get_list_length_at_path(d, elevation);
     return count ? count : 1;
 }
 
-int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in)
+int scene_count_orbit_views(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     char elevation[SCENE_PATH_SIZE];
-    return in && in->orbit ? in->orbit->views * count_circles(d, path, elevation) : 1;
+    return in && in->orbit ? in->orbit->views * count_elevations_of_orbit(d, path, elevation) : 1;
 }
 
 static void convert_elevations(const scene_document *d, const char *path, scene_orbit *out)
 {
     char elevation[SCENE_PATH_SIZE], item[SCENE_PATH_SIZE + 16];
-    out->circle_count = count_circles(d, path, elevation);
+    out->circle_count = count_elevations_of_orbit(d, path, elevation);
     out->elevations[0] = 30;
-    if (scene_document_kind(d, elevation) == SCENE_SCALAR) out->elevations[0] = scene_document_number(d, elevation);
-    if (scene_document_kind(d, elevation) != SCENE_LIST) return;
+    if (scene_get_node_type_at_path(d, elevation) == SCENE_SCALAR)
+        out->elevations[0] = scene_get_number_at_path(d, elevation);
+    if (scene_get_node_type_at_path(d, elevation) != SCENE_LIST) return;
     for (int i = 0; i < out->circle_count; i++) {
         snprintf(item, sizeof item, "%s[%d]", elevation, i);
-        out->elevations[i] = scene_document_number(d, item);
+        out->elevations[i] = scene_get_number_at_path(d, item);
     }
 }
 
 /* Returns an error if the camera has keys that its orbit replaces. */
-static insitu_status refuse_replaced_keys(const scene_document *d, const char *path, const scene_file_camera *in)
+static insitu_status fail_for_keys_replaced_by_orbit(const scene_document *d, const char *path,
+                                                     const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";
     if (in->position) return scene_fail_at_key(d, path, "position", words);
@@ -81,12 +83,12 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
 {
     static const double upwards[3] = {0, 1, 0};
     scene_orbit *orbit = &out->orbit;
-    const insitu_status status = refuse_replaced_keys(d, path, in);
+    const insitu_status status = fail_for_keys_replaced_by_orbit(d, path, in);
     if (status) return status;
     orbit->view_count = in->orbit->views;
     orbit->start = in->orbit->start ? *in->orbit->start : 0;
     memcpy(orbit->axis, in->orbit->axis ? in->orbit->axis : upwards, sizeof orbit->axis);
-    if (!scene_normalize(orbit->axis))
+    if (!scene_normalize_vector(orbit->axis))
         return scene_fail_at_key(d, path, "orbit.axis", "has length 0, expected a direction");
     convert_elevations(d, path, orbit);
     memcpy(out->up, orbit->axis, sizeof out->up);

@@ -17,7 +17,7 @@
  * each, and the angle of view. */
 enum { NUMBERS_OF_POINT = 10 };
 
-static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POINT])
+static void pack_camera_point(const scene_camera_point *p, double out[NUMBERS_OF_POINT])
 {
     memcpy(out, p->eye, sizeof p->eye);
     memcpy(out + 3, p->focal, sizeof p->focal);
@@ -33,7 +33,7 @@ typedef struct cubic_points {
 } cubic_points;
 
 /* Returns the slope of the curve at point i, which is 1 or 2. */
-static double compute_slope(const cubic_points *p, int i)
+static double compute_slope_at_point(const cubic_points *p, int i)
 {
     const double before = p->times[i] - p->times[i - 1], after = p->times[i + 1] - p->times[i];
     const double down = (p->values[i] - p->values[i - 1]) / before, up = (p->values[i + 1] - p->values[i]) / after;
@@ -44,10 +44,11 @@ static double compute_slope(const cubic_points *p, int i)
 
 /* Returns the interpolated value between the second point (share is 0) and the third point (share is 1). The result is
  * clamped, so that rounding does not take it beyond the values of these points. */
-static double cubic_value(const cubic_points *p, double share)
+static double interpolate_cubic(const cubic_points *p, double share)
 {
     const double h = p->times[2] - p->times[1], a = p->values[1], b = p->values[2], t = share;
-    const double from = p->has_first ? h * compute_slope(p, 1) : 0, to = p->has_last ? h * compute_slope(p, 2) : 0;
+    const double from = p->has_first ? h * compute_slope_at_point(p, 1) : 0,
+                 to = p->has_last ? h * compute_slope_at_point(p, 2) : 0;
     const double value = a + (b - a) * t * t * (3 - 2 * t) + t * (1 - t) * ((1 - t) * from - t * to);
     return fmax(fmin(a, b), fmin(fmax(a, b), value));
 }
@@ -67,13 +68,13 @@ static void interpolate_camera(const scene_camera *camera, int i, double at, sce
     cubic_points p = {.has_first = i > 0, .has_last = i + 2 < camera->point_count};
     for (int k = 0; k < 4; k++) {
         const int n = i - 1 + k < 0 ? 0 : i - 1 + k < camera->point_count ? i - 1 + k : camera->point_count - 1;
-        list_numbers(&camera->points[n], numbers[k]);
+        pack_camera_point(&camera->points[n], numbers[k]);
         p.times[k] = camera->points[n].at;
     }
     const double share = (at - p.times[1]) / (p.times[2] - p.times[1]);
     for (int n = 0; n < NUMBERS_OF_POINT; n++) {
         for (int k = 0; k < 4; k++) p.values[k] = numbers[k][n];
-        found[n] = cubic_value(&p, share);
+        found[n] = interpolate_cubic(&p, share);
     }
     memcpy(out->eye, found, sizeof out->eye);
     memcpy(out->focal, found + 3, sizeof out->focal);
@@ -81,7 +82,7 @@ static void interpolate_camera(const scene_camera *camera, int i, double at, sce
     out->angle = found[9];
 }
 
-scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time)
+scene_camera scene_compute_camera_at_time(const scene_camera *camera, int64_t cycle, double time)
 {
     scene_camera out = *camera;
     if (camera->point_count == 0) return out;
@@ -98,8 +99,8 @@ scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double t
 
 /* ---- reading the points ------------------------------------------------------------------------------------------ */
 
-static insitu_status convert_time(const scene_document *d, const char *path, const scene_file_point *in,
-                                  const scene_camera *camera, scene_camera_point *out)
+static insitu_status convert_time_of_camera_point(const scene_document *d, const char *path, const scene_file_point *in,
+                                                  const scene_camera *camera, scene_camera_point *out)
 {
     const scene_camera_point *before = out > camera->points ? out - 1 : NULL;
     const char *key = camera->is_by_cycle ? "cycle" : "time";
@@ -116,8 +117,8 @@ static insitu_status convert_time(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
-static insitu_status convert_point(const scene_document *d, const char *path, const scene_file_point *in,
-                                   const scene_camera *camera, scene_camera_point *out)
+static insitu_status convert_camera_point(const scene_document *d, const char *path, const scene_file_point *in,
+                                          const scene_camera *camera, scene_camera_point *out)
 {
     double view[3];
     memcpy(out->eye, in->position, sizeof out->eye);
@@ -125,14 +126,14 @@ static insitu_status convert_point(const scene_document *d, const char *path, co
     memcpy(out->up, in->up ? in->up : camera->up, sizeof out->up);
     out->angle = in->angle ? *in->angle : camera->angle;
     for (int i = 0; i < 3; i++) view[i] = out->eye[i] - out->focal[i];
-    if (!scene_normalize(view))
+    if (!scene_normalize_vector(view))
         return scene_fail_at_key(d, path, "focal", "[%g, %g, %g] is the position too, expected another point",
                                  out->focal[0], out->focal[1], out->focal[2]);
-    if (!scene_normalize(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
-    if (scene_is_parallel(out->up, view))
+    if (!scene_normalize_vector(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
+    if (scene_are_vectors_parallel(out->up, view))
         return scene_fail_at_key(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
                                  out->up[0], out->up[1], out->up[2]);
-    return convert_time(d, path, in, camera, out);
+    return convert_time_of_camera_point(d, path, in, camera, out);
 }
 
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -152,7 +153,7 @@ insitu_status scene_convert_path(const scene_document *d, const char *path, cons
     for (int i = 0; i < in->path_count && !status; i++) {
         char point[SCENE_PATH_SIZE];
         snprintf(point, sizeof point, "%s.path[%d]", path, i);
-        status = convert_point(d, point, &in->path[i], out, &out->points[i]);
+        status = convert_camera_point(d, point, &in->path[i], out, &out->points[i]);
     }
     out->point_count = in->path_count;
     return status;

@@ -17,7 +17,7 @@ static bool sweeps_over_planes(const scene_file_image *in)
 }
 
 /* Stores the image's first isosurface in *found, and returns how many isosurfaces the image has. */
-static int find_isosurface(const scene_file_image *in, const scene_file_isosurface **found)
+static int find_and_count_isosurfaces(const scene_file_image *in, const scene_file_isosurface **found)
 {
     int count = 0;
     for (int i = 0; i < in->layers_count; i++)
@@ -25,7 +25,7 @@ static int find_isosurface(const scene_file_image *in, const scene_file_isosurfa
     return count;
 }
 
-static int find_slice(const scene_file_image *in, const scene_file_slice **found)
+static int find_and_count_slices(const scene_file_image *in, const scene_file_slice **found)
 {
     int count = 0;
     for (int i = 0; i < in->layers_count; i++)
@@ -33,14 +33,14 @@ static int find_slice(const scene_file_image *in, const scene_file_slice **found
     return count;
 }
 
-static int list_fields(const scene_document *d, const char *path, const char *fields[SCENE_MAX_NAMES])
+static int list_swept_fields(const scene_document *d, const char *path, const char *fields[SCENE_MAX_NAMES])
 {
     char fields_path[SCENE_PATH_SIZE];
     snprintf(fields_path, sizeof fields_path, "%s.sweep.fields", path);
-    return scene_document_texts(d, fields_path, fields, SCENE_MAX_NAMES);
+    return scene_list_texts_at_path(d, fields_path, fields, SCENE_MAX_NAMES);
 }
 
-static insitu_status check_fields(const scene_document *d, const char *path, const char *const *fields, int count)
+static insitu_status check_swept_fields(const scene_document *d, const char *path, const char *const *fields, int count)
 {
     for (int i = 0; i < count; i++) {
         char key[32];
@@ -59,7 +59,7 @@ static insitu_status count_swept_isovalues_and_planes(const scene_document *d, c
 {
     const scene_file_isosurface *isosurface = NULL;
     const scene_file_slice *slice = NULL;
-    const int isosurfaces = find_isosurface(in, &isosurface), slices = find_slice(in, &slice);
+    const int isosurfaces = find_and_count_isosurfaces(in, &isosurface), slices = find_and_count_slices(in, &slice);
     if (sweeps_over_isovalues(in) && isosurfaces != 1)
         return scene_fail_at_key(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one",
                                  isosurfaces);
@@ -75,15 +75,15 @@ insitu_status scene_count_sweep_dimensions(const scene_document *d, const char *
 {
     char camera[SCENE_PATH_SIZE];
     const char *fields[SCENE_MAX_NAMES];
-    const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
+    const int field_count = in->sweep ? list_swept_fields(d, path, fields) : 0;
     snprintf(camera, sizeof camera, "%s.camera", path);
-    *out = (scene_series){field_count ? field_count : 1, 1, 1, scene_count_views(d, camera, in->camera)};
+    *out = (scene_series){field_count ? field_count : 1, 1, 1, scene_count_orbit_views(d, camera, in->camera)};
     if (!in->sweep) return INSITU_OK;
     if (!sweeps_over_isovalues(in) && !sweeps_over_planes(in) && field_count == 0)
         return scene_fail_at_key(d, path, "sweep",
                                  "holds nothing, expected isovalues: true, planes: true, fields or several");
     const insitu_status status = count_swept_isovalues_and_planes(d, path, in, out);
-    return status ? status : check_fields(d, path, fields, field_count);
+    return status ? status : check_swept_fields(d, path, fields, field_count);
 }
 
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count)
@@ -107,7 +107,7 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
 
 /* ---- reducing the layers to what one picture of a sweep shows ---------------------------------------------------- */
 
-static bool replace_field(scene_field *field, const char *name, int line)
+static bool replace_field_name(scene_field *field, const char *name, int line)
 {
     char *copy = base_strdup(name);
     if (!copy) return false;
@@ -119,34 +119,37 @@ static bool replace_field(scene_field *field, const char *name, int line)
 
 /* Replaces the field that colours a layer. If the layer's contour lines are contours of the same field, they become
  * contour lines of the new field. */
-static bool replace_colours(scene_field *field, scene_lines *lines, const char *name, int line)
+static bool replace_colour_and_contour_field(scene_field *field, scene_lines *lines, const char *name, int line)
 {
-    return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
+    return replace_field_name(field, name, line) &&
+           (!lines->is_of_colours || replace_field_name(&lines->field, name, line));
 }
 
 /* Replaces the field in all layers that are coloured by a field. *count receives the number of these layers. */
-static bool replace_fields(scene_image *image, const char *name, int line, int *count)
+static bool replace_field_of_coloured_layers(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;
     *count = image->slice_count + image->volume_count;
     for (int i = 0; i < image->slice_count && is_done; i++)
-        is_done = replace_colours(&image->slices[i].field, &image->slices[i].lines, name, line);
+        is_done = replace_colour_and_contour_field(&image->slices[i].field, &image->slices[i].lines, name, line);
     for (int i = 0; i < image->volume_count && is_done; i++)
-        is_done = replace_field(&image->volumes[i].field, name, line);
+        is_done = replace_field_name(&image->volumes[i].field, name, line);
     for (int i = 0; i < image->isosurface_count && is_done; i++) {
         if (!image->isosurfaces[i].has_colour_by) continue;
-        is_done = replace_colours(&image->isosurfaces[i].colour_by, &image->isosurfaces[i].lines, name, line);
+        is_done = replace_colour_and_contour_field(&image->isosurfaces[i].colour_by, &image->isosurfaces[i].lines, name,
+                                                   line);
         ++*count;
     }
     for (int i = 0; i < image->surface_count && is_done; i++) {
         if (!image->surfaces[i].has_colour_by) continue;
-        is_done = replace_colours(&image->surfaces[i].colour_by, &image->surfaces[i].lines, name, line);
+        is_done =
+            replace_colour_and_contour_field(&image->surfaces[i].colour_by, &image->surfaces[i].lines, name, line);
         ++*count;
     }
     return is_done;
 }
 
-static void select_isovalue(scene_image *image, int index)
+static void keep_only_isovalue(scene_image *image, int index)
 {
     scene_isosurface *layer = &image->isosurfaces[0];
     layer->values[0] = layer->values[index];
@@ -156,7 +159,7 @@ static void select_isovalue(scene_image *image, int index)
     image->isovalue = layer->values[0];
 }
 
-static void select_plane(scene_image *image, int index)
+static void keep_only_plane(scene_image *image, int index)
 {
     scene_slice *layer = &image->slices[0];
     layer->planes[0] = layer->planes[index];
@@ -167,16 +170,17 @@ static void select_plane(scene_image *image, int index)
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in, scene_image *out)
 {
     const char *fields[SCENE_MAX_NAMES];
-    const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
-    if (sweeps_over_isovalues(in)) select_isovalue(out, out->variant.isovalue);
-    if (sweeps_over_planes(in)) select_plane(out, out->variant.plane);
+    const int field_count = in->sweep ? list_swept_fields(d, path, fields) : 0;
+    if (sweeps_over_isovalues(in)) keep_only_isovalue(out, out->variant.isovalue);
+    if (sweeps_over_planes(in)) keep_only_plane(out, out->variant.plane);
     if (field_count == 0) return INSITU_OK;
     char key[SCENE_PATH_SIZE];
     int replaced;
     snprintf(key, sizeof key, "%s.sweep.fields[%d]", path, out->variant.field);
     const char *field = fields[out->variant.field];
     out->swept_field = base_strdup(field);
-    if (!out->swept_field || !replace_fields(out, field, scene_document_line(d, key), &replaced))
+    if (!out->swept_field ||
+        !replace_field_of_coloured_layers(out, field, scene_get_line_number_at_path(d, key), &replaced))
         return scene_fail_for_memory(d);
     if (replaced) return INSITU_OK;
     return scene_fail_at_key(d, path, "sweep.fields",

@@ -5,7 +5,7 @@
 
 /* The vector is scaled by its largest component first, so that squares of very small or large components, such as
  * 1e-200 and 1e200, neither underflow nor overflow. */
-bool scene_normalize(double v[3])
+bool scene_normalize_vector(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     if (!(largest > 0)) return false;
@@ -17,7 +17,7 @@ bool scene_normalize(double v[3])
 
 /* The limit is a millionth of a radian: at smaller angles the image's right direction would mostly consist of rounding
  * errors. */
-bool scene_is_parallel(const double a[3], const double b[3])
+bool scene_are_vectors_parallel(const double a[3], const double b[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
     return sqrt(x * x + y * y + z * z) < 1e-6;
