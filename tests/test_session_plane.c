@@ -427,6 +427,23 @@ static void colour_bars_state_the_field_and_range(void **state)
     }
 }
 
+#define BAR_UP_TO(high) "      - surface: {colour_by: {field: f, range: [0, " high "]}}\n"
+
+/* The texts of the second bar are shorter than those of the first. */
+static void equal_colour_bars_are_drawn_once(void **state)
+{
+    (void)state;
+    const char *scene =
+        "images:\n  - name: a\n    size: [120, 50]\n    layers:\n" BAR_UP_TO("0.00125") BAR_UP_TO("0.00125")
+            BAR_UP_TO("1") BAR_UP_TO("1") "    decorations: {colour_bar: {ticks: 3}}\n    outputs: [{path: a.png}]\n";
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    caught_picture picture = draw_plate(MPI_COMM_WORLD, write_scene(scene), &part, false);
+    const char *second = own_rank == 0 ? strchr(picture.bars, '\n') : NULL;
+    everywhere(own_rank != 0 || (second && strcmp(second, "\nf: 0 0.5 1.0\n") == 0));
+    free_caught(&picture);
+}
+
 /* ---- statistics ----------------------------------------------------------------------------------------------- */
 
 enum { MOST = 1 << 12 };
@@ -623,6 +640,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(coverage_of_curved_lines_matches_strips),
                                        cmocka_unit_test(lines_beyond_the_field_are_reported),
                                        cmocka_unit_test(colour_bars_state_the_field_and_range),
+                                       cmocka_unit_test(equal_colour_bars_are_drawn_once),
                                        cmocka_unit_test(solid_cells_require_z_coordinates),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),
                                        cmocka_unit_test(conditions_weigh_shells_by_area),

@@ -288,6 +288,14 @@ static void write_colour_bar_label(const scene_decorations *scene, int bar, cons
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
+static bool are_ticks_equal(const insitu_colour_bar *a, const insitu_colour_bar *b)
+{
+    bool are_equal = a->tick_count == b->tick_count;
+    for (int i = 0; i < a->tick_count && are_equal; i++)
+        are_equal = a->ticks[i].place == b->ticks[i].place && strcmp(a->ticks[i].text, b->ticks[i].text) == 0;
+    return are_equal;
+}
+
 /* Returns whether an earlier colour bar has the same field, colours and ticks. This happens if several layers show one
  * field. */
 static bool is_equal_colour_bar_present(const session_decorations *d, int bar)
@@ -298,9 +306,9 @@ static bool is_equal_colour_bar_present(const session_decorations *d, int bar)
         const insitu_colour_bar *a = &d->bars[i];
         is_found = strcmp(d->fields[i]->name, d->fields[bar]->name) == 0 &&
                    d->fields[i]->component == d->fields[bar]->component && a->is_banded == b->is_banded &&
-                   a->colour_count == b->colour_count && a->tick_count == b->tick_count &&
+                   a->colour_count == b->colour_count &&
                    memcmp(a->colours, b->colours, (size_t)a->colour_count * 3 * sizeof *a->colours) == 0 &&
-                   memcmp(a->ticks, b->ticks, (size_t)a->tick_count * sizeof *a->ticks) == 0;
+                   are_ticks_equal(a, b);
     }
     return is_found;
 }
