@@ -84,7 +84,7 @@ static void select_lowest_instruction_set(const session_changes *changes, sessio
                  cpu_isa_name((cpu_isa)changes->isa_best));
 }
 
-static void warn_of_isa_setting(const session_team *team, session_report *report)
+static void warn_of_instruction_set_setting(const session_team *team, session_report *report)
 {
     const char *isa = render_isa_warning();
     session_warn_locally(report, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "rank %d: %s",
@@ -98,8 +98,8 @@ static session_derive_basis make_derive_basis(insitu_session *s)
 
 /* Computes the derived fields that the step's statistics and conditions use. Collective; all ranks return the same
  * status. */
-static insitu_status derive_fields_for_statistics(insitu_session *s, const session_moment *moment, bool images,
-                                                  base_error *error)
+static insitu_status derive_statistics_and_condition_fields(insitu_session *s, const session_moment *moment,
+                                                            bool images, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
     const uint64_t needed = session_find_derived_fields_of_events(scene, moment->cycle, images);
@@ -125,7 +125,7 @@ static void update_statistics_and_conditions(insitu_session *s, session_plan_bas
     if (session_are_any_statistics_needed(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
         const session_valid_events valid = session_check_event_fields(basis, images, error);
-        if (derive_fields_for_statistics(s, moment, images, &own) == INSITU_OK)
+        if (derive_statistics_and_condition_fields(s, moment, images, &own) == INSITU_OK)
             session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
                                                &valid, &own);
         if (!error->status) *error = own;
@@ -377,7 +377,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
     session_writer_collect_results(&session->writer, &session->report);
-    warn_of_isa_setting(&session->team, &session->report);
+    warn_of_instruction_set_setting(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
         session_warn_of_unused_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
     insitu_status status = session_reduce_changes_over_ranks(session, cycle, time, &changes, &session->error);
@@ -390,7 +390,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
             status = share_error_of_unwritten_pictures(session, &session->error);
     }
     queue_report_json(session);
-    session_add_memory_and_warnings(&session->meshes, &session->trees.parent, &session->writer,
+    session_add_mesh_data_to_report(&session->meshes, &session->trees.parent, &session->writer,
                                     session->scene_file.warning, &session->report);
     session_release_filled_arrays(&session->meshes);
     session->report.public_report.total_ms = get_milliseconds_since(start);

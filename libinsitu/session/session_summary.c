@@ -156,7 +156,7 @@ static void report_memory_of_outer_meshes(session_report *out, copied_reasons *c
     add_copied_bytes_with_reason(copied, bytes, "its outer faces");
 }
 
-static void report_recognised_and_split_cells(session_report *out, copied_reasons *copied, const session_mesh *mesh)
+static void report_bytes_of_copied_cell_arrays(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     const session_topology *t = &mesh->topology;
     out->public_report.cells_recognised += mesh->source ? 0 : t->recognised_count;
@@ -196,7 +196,7 @@ static void report_cells_and_memory_of_part(session_report *out, copied_reasons 
         report->cells += session_cell_count(mesh);
         report->bytes_borrowed += count_mesh_bytes(&mesh->original);
     }
-    report_recognised_and_split_cells(out, copied, mesh);
+    report_bytes_of_copied_cell_arrays(out, copied, mesh);
     if (!mesh->is_check_stale && !mesh->source) {
         report->cells_ghost += mesh->given_counts.ghost_count;
         report->cells_inverted += mesh->given_counts.inverted_count;
@@ -265,7 +265,7 @@ static void report_mesh_from_its_parts(session_report *out, const session_parts 
     report_data_not_shown(out, parts);
 }
 
-void session_add_memory_and_warnings(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
+void session_add_mesh_data_to_report(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
                                      const char *scene_warning, session_report *out)
 {
     insitu_report *report = &out->public_report;

@@ -246,7 +246,7 @@ static insitu_status quantize_colour_map(const scene_document *d, int bands, sce
     return INSITU_OK;
 }
 
-static void convert_srgb_to_linear(float to[3], const double *srgb)
+static void convert_srgb_colour_to_linear(float to[3], const double *srgb)
 {
     for (int c = 0; c < 3; c++) to[c] = colour_linear_from_srgb((float)srgb[c]);
 }
@@ -259,9 +259,9 @@ static void convert_outside_colours(const scene_file_colour_map *in, scene_colou
     out->has_nan = in->nan != NULL;
     memcpy(out->outside_colours[0], out->colours, sizeof out->outside_colours[0]);
     memcpy(out->outside_colours[1], out->colours + 3 * (size_t)(out->count - 1), sizeof out->outside_colours[1]);
-    if (in->below) convert_srgb_to_linear(out->outside_colours[0], in->below);
-    if (in->above) convert_srgb_to_linear(out->outside_colours[1], in->above);
-    convert_srgb_to_linear(out->outside_colours[2], in->nan ? in->nan : grey);
+    if (in->below) convert_srgb_colour_to_linear(out->outside_colours[0], in->below);
+    if (in->above) convert_srgb_colour_to_linear(out->outside_colours[1], in->above);
+    convert_srgb_colour_to_linear(out->outside_colours[2], in->nan ? in->nan : grey);
 }
 
 /* ---- ranges and scales ----------------------------------------------------------------------------------------- */

@@ -359,7 +359,7 @@ static bool report_key_without_colon(const fault *f)
                               limit_length_of_quotation(length), l.start + column);
 }
 
-static bool report_wrong_node_type_at_line_start(const fault *f)
+static bool report_invalid_start_of_value(const fault *f)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     const text_line l = find_line_by_index(f->text, f->size, f->parser->problem_mark.line);
@@ -400,7 +400,7 @@ void scene_describe_syntax_error(const yaml_parser_t *parser, const char *text, 
         report_incomplete_previous_line(&f, stop))
         return;
     if (report_inconsistent_indentation(&f, stop) || report_key_without_colon(&f) ||
-        report_wrong_node_type_at_line_start(&f) || report_misplaced_unquoted_text(&f, stop))
+        report_invalid_start_of_value(&f) || report_misplaced_unquoted_text(&f, stop))
         return;
     write_syntax_error(&f, f.last_line, "not valid YAML: %.100s%s%.100s",
                        parser->problem ? parser->problem : "unreadable", *context ? " " : "", context);

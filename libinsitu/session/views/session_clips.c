@@ -109,7 +109,7 @@ static void shrink_box_to_sphere(clip_box *box, const render_clip *clip)
     intersect_box_with_box(box, lower, upper);
 }
 
-static void shrink_box_outside_clip_box(clip_box *box, const render_clip *clip)
+static void empty_box_if_inside_clip_box(clip_box *box, const render_clip *clip)
 {
     bool is_within = true;
     for (int axis = 0; axis < 3; axis++)
@@ -124,7 +124,7 @@ static void shrink_box_to_clip(clip_box *box, const render_clip *clip)
     case RENDER_CLIP_SPHERE: shrink_box_to_sphere(box, clip); break;
     case RENDER_CLIP_BOX:
         if (clip->is_outside)
-            shrink_box_outside_clip_box(box, clip);
+            empty_box_if_inside_clip_box(box, clip);
         else
             intersect_box_with_box(box, clip->lower, clip->upper);
     }

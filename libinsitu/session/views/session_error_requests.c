@@ -240,8 +240,8 @@ static void add_error_request_for_volume(session_error_requests *requests, const
 /* Sets needs_all if the image shows a volume of the mesh, and needs_outer if it shows the mesh's outer surface. If the
  * outer surface has a threshold, needs_all is set too, because the outer faces of the selected cells may lie anywhere
  * in the mesh. In each case, marks the request for positions as shown by the image. */
-static void mark_layers_without_error_bound_needs(session_error_requests *requests, const session_due_views *views,
-                                                  const session_catalogue_mesh *mesh, int index)
+static void request_all_or_outer_cells(session_error_requests *requests, const session_due_views *views,
+                                       const session_catalogue_mesh *mesh, int index)
 {
     const scene_image *image = &views->scene->images[index];
     const session_error_request positions = {.field = NULL};
@@ -279,7 +279,7 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
         const scene_image *image = &scene->images[i];
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
-        mark_layers_without_error_bound_needs(out, views, mesh, i);
+        request_all_or_outer_cells(out, views, mesh, i);
         out->needs_all = out->needs_all || shows_field_computed_from_neighbours(mesh, image);
         for (int layer = 0; layer < image->isosurface_count; layer++)
             add_error_request_for_isosurface(out, views, mesh, image, i, layer, report);

@@ -254,8 +254,8 @@ static bool is_part_shown_by_surface_layer(const session_part_walk *walk, const 
            session_find_outer_surface(walk->whole, &layer->threshold) == walk->outer;
 }
 
-static render_field set_distance_field_of_outer_faces(const session_meshes *meshes, session_layers *layers, int slot,
-                                                      const scene_surface *layer)
+static render_field set_scalar_of_outer_face_meshes(const session_meshes *meshes, session_layers *layers, int slot,
+                                                    const scene_surface *layer)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     ptrdiff_t at = first;
@@ -335,7 +335,7 @@ static insitu_status fill_outer_surface_layer(const session_layer_basis *basis, 
     const bool is_curved = session_has_curved_faces(basis->catalogue);
     const scene_material *m = choose_outer_surface_material(basis, layer);
     render_surface_layer *out = &layers->surfaces[surface];
-    *out = (render_surface_layer){.field = set_distance_field_of_outer_faces(basis->meshes, layers, 2 * surface, layer),
+    *out = (render_surface_layer){.field = set_scalar_of_outer_face_meshes(basis->meshes, layers, 2 * surface, layer),
                                   .value_count = 1,
                                   .values = &layers->distances[surface],
                                   .colours = layer->colour,
