@@ -128,8 +128,8 @@ ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int
     uint64_t low, high;
     memcpy(&low, &half, sizeof low);
     memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
-    low |= high << 4; /* the shift and OR pack two half bytes into one byte; lanes from `count` on are 0, so that no
-                         half byte is overwritten */
+    low |= high << 4; /* the shift and OR pack two half bytes into one byte; lanes from `count` on are 0, so that
+                         the OR leaves the other half byte unchanged */
     memcpy(out, &twos, sizeof twos);
     out += (nibbles & 4) / 2 * (size_t)count;
     memcpy(out, &ones, sizeof ones);

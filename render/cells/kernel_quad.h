@@ -327,7 +327,7 @@ SIMD_INLINE vm kernel_quad_sides_allow_two_points(vm rays, vf e01, vf e32, vf e0
 }
 
 /* Returns v, negated in lanes in which the sign bit of `other` is set. */
-SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
+SIMD_INLINE vf kernel_multiply_by_sign(vf v, vf other)
 {
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
@@ -339,8 +339,8 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
     const vf other = vf_diff_of_products(q->x[3], q->y[1], q->x[1], q->y[3]);
     const vf slack = 1e-6f * (vf_abs(across) + vf_abs(other));
-    const vm b = vf_le(kernel_flip_sign(across + other, q->e01), slack);
-    const vm a = vf_le(kernel_flip_sign(across - other, q->e03), slack);
+    const vm b = vf_le(kernel_multiply_by_sign(across + other, q->e01), slack);
+    const vm a = vf_le(kernel_multiply_by_sign(across - other, q->e03), slack);
     return vm_and(rays, vm_and(a, b));
 }
 

@@ -85,7 +85,7 @@ static inline void kernel_packet_compute_pixel_slopes(const kernel_packet *p, do
 }
 
 /* Returns entries[index] for each lane. entries: one number for each column, or for each row, of the tile. */
-SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi index)
+SIMD_INLINE vf kernel_gather_from_tile_row_or_column(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
 }
@@ -98,10 +98,10 @@ static inline void kernel_packet_set_rays_of_tile(kernel_packet *p, int x0, int 
     const vi tile_column = column + (x0 - tile->x0), tile_row = row + (y0 - tile->y0);
     p->column = column + x0;
     p->row = row + y0;
-    p->origin_x = kernel_gather_tile_numbers(tile->origin_x, tile_column);
-    p->slope_x = kernel_gather_tile_numbers(tile->slope_x, tile_column);
-    p->origin_y = kernel_gather_tile_numbers(tile->origin_y, tile_row);
-    p->slope_y = kernel_gather_tile_numbers(tile->slope_y, tile_row);
+    p->origin_x = kernel_gather_from_tile_row_or_column(tile->origin_x, tile_column);
+    p->slope_x = kernel_gather_from_tile_row_or_column(tile->slope_x, tile_column);
+    p->origin_y = kernel_gather_from_tile_row_or_column(tile->origin_y, tile_row);
+    p->slope_y = kernel_gather_from_tile_row_or_column(tile->slope_y, tile_row);
 }
 
 /* Sets the indices of the packet's pixels in the image from their columns and rows, and makes those rays active whose

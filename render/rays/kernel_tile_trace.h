@@ -329,9 +329,10 @@ SIMD_INLINE void kernel_lane_rays_through_pixels(kernel_lane_rays *out, const ke
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
     out->lane = lane & (SIMD_WIDTH - 1);
     out->at = kernel_pixel_position(column, row);
-    out->rays = (kernel_rays){
-        kernel_gather_tile_numbers(tile->origin_x, column), kernel_gather_tile_numbers(tile->origin_y, row),
-        kernel_gather_tile_numbers(tile->slope_x, column), kernel_gather_tile_numbers(tile->slope_y, row)};
+    out->rays = (kernel_rays){kernel_gather_from_tile_row_or_column(tile->origin_x, column),
+                              kernel_gather_from_tile_row_or_column(tile->origin_y, row),
+                              kernel_gather_from_tile_row_or_column(tile->slope_x, column),
+                              kernel_gather_from_tile_row_or_column(tile->slope_y, row)};
 }
 
 /* Loads up to SIMD_WIDTH rays of the list, from index `first` on. Lanes behind the end of the list are inactive. */

@@ -65,8 +65,8 @@ SIMD_INLINE void kernel_local_get_boundary_rays(const kernel_tile *tile, int32_t
         vi at;
         memcpy(&at, ends[n], sizeof at);
         at = vi_from_vf(vf_clamp(vf_from_vi(at), first, last));
-        slope[a][end] = kernel_gather_tile_numbers(a ? tile->slope_y : tile->slope_x, at);
-        origin[a][end] = kernel_gather_tile_numbers(a ? tile->origin_y : tile->origin_x, at);
+        slope[a][end] = kernel_gather_from_tile_row_or_column(a ? tile->slope_y : tile->slope_x, at);
+        origin[a][end] = kernel_gather_from_tile_row_or_column(a ? tile->origin_y : tile->origin_x, at);
     }
 }
 

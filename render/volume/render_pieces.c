@@ -249,7 +249,7 @@ static void set_piece(const render_transfer *t, const kept_entry *entries, kerne
 /* ---- search table of pieces; steps of the opacity ---- */
 
 /* Fills the table by which the piece of a value is found. */
-static void fill_bins(kernel_pieces *out)
+static void fill_search_table_of_pieces(kernel_pieces *out)
 {
     int piece = 0;
     for (int i = 0; i < KERNEL_PIECE_BINS; i++) {
@@ -413,7 +413,7 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     set_piece(t, entries, cuts[count - 1], endless, out->pieces[count]);
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
-    fill_bins(out);
+    fill_search_table_of_pieces(out);
     find_colour_range(t, &low, &high);
     out->contrast = high - low;
     fill_steps(out, t);

@@ -150,7 +150,7 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
 /* Computes the integrals and ranges of all bins. Below the first and above the last cut between its pieces the transfer
  * function is constant; each of these two infinite ranges is represented by one bin. low: value at which the other bins
  * begin; count: their number. */
-static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
+static void compute_integrals_of_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
     /* The last argument and result of get_cached_extinction(). -1 is never an argument, so that the cache is empty at
      * first. */
@@ -281,7 +281,7 @@ static void fill(kernel_preintegral *out, const kernel_pieces *exact, const rend
     const double low = (double)exact->bin_low, width = range / out->bin_count;
     out->low = (float)low;
     out->inverse = (float)(1 / width);
-    fill_bins(exact, low, width, out->bin_count, bins);
+    compute_integrals_of_bins(exact, low, width, out->bin_count, bins);
     const double change = store_bin_integrals(out, bins, width, contrast);
     compute_colour_bends(out, t);
     out->contrast = (float)contrast;

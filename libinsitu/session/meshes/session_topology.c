@@ -430,7 +430,7 @@ typedef struct recognition {
 } recognition;
 
 /* Returns whether the cell's entries lie within the connectivity and are indices of faces or vertices. */
-static bool has_good_entries(const session_mesh *mesh, int64_t cell, int type)
+static bool has_valid_connectivity(const session_mesh *mesh, int64_t cell, int type)
 {
     const grid *g = &mesh->cells;
     const int64_t limit = type == GRID_POLYHEDRON ? g->face_count : g->vertex_count;
@@ -449,7 +449,7 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
 {
     const int type = grid_cell_type(&mesh->cells, cell);
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
-    if ((grid_type_vertex_count(type) == 0 && type != GRID_POLYHEDRON) || !has_good_entries(mesh, cell, type)) {
+    if ((grid_type_vertex_count(type) == 0 && type != GRID_POLYHEDRON) || !has_valid_connectivity(mesh, cell, type)) {
         r->is_faulty = true;
         return;
     }

@@ -7,7 +7,7 @@
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Returns whether any mesh contains only shells, over all ranks. */
+/* Returns whether there is a mesh whose cells are shells on all ranks. */
 bool session_has_shells(const session_catalogue *catalogue);
 
 /* Returns a surface layer that draws an isosurface layer as contour lines on shells. The result points to data of the

@@ -37,7 +37,8 @@
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
 #define LOW_UNIT 0x1p44 /* value of one unit of a high word, in units of a low word */
-/* least sum of the squared lengths of a corner's edges, in units of the square of session_gradient_basis.length */
+/* A corner adds no gradient if the squared lengths of the cell's edges at the corner add up to less than this, in units
+ * of the square of session_gradient_basis.length. */
 #define LEAST_SQUARE 0x1p-64
 #define ROUNDING_SHIFT                                                                                                 \
     0x1.8p52 /* when this is added to a number below 2^51, the last bits of the result contain the nearest integer */

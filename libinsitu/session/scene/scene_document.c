@@ -196,7 +196,8 @@ bool scene_is_valid_path_name(const char *name)
     return *name && strlen(name) <= most_plain && !name[strcspn(name, ".[")];
 }
 
-/* Returns the entry of a list whose key `name` has this value, or NULL if there is none. */
+/* Returns the mapping in a list whose value of the key "name" is the string `name` of `length` bytes; NULL if there is
+ * none. */
 static const yaml_node_t *find_entry_by_name(const scene_document *d, const yaml_node_t *list, const char *name,
                                              size_t length)
 {

@@ -38,7 +38,7 @@ typedef struct new_lines {
 
 /* Returns the number of significant digits that resolve the width of the range to nine digits, even if the range is far
  * from 0. It is at most the number of digits of a double. */
-static int count_needed_digits(double low, double high)
+static int count_digits_to_resolve_range(double low, double high)
 {
     enum { OF_THE_WIDTH = 9, MOST = 17 };
     const double share = (0.5 * high - 0.5 * low) / fmax(fabs(low), fabs(high));
@@ -48,7 +48,8 @@ static int count_needed_digits(double low, double high)
 static void write_line(text_output *out, const new_lines *n)
 {
     const session_statistics *v = n->values;
-    const int digits = count_needed_digits(v->minimum, v->maximum), of_bins = count_needed_digits(v->low, v->high);
+    const int digits = count_digits_to_resolve_range(v->minimum, v->maximum),
+              of_bins = count_digits_to_resolve_range(v->low, v->high);
     text_print(out, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
                v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean, v->deviation);
     if (v->bin_count) text_print(out, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
