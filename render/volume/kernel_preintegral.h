@@ -188,7 +188,7 @@ SIMD_INLINE void kernel_preint_get_light(const kernel_preint_subinterval *sub, k
     light->transmittance = 1.0f - sub->absorbed;
 }
 
-/* Replaces the light of the rays in m. */
+/* Replaces the light of the rays in m by other light. */
 SIMD_INLINE void kernel_light_replace(vm m, const kernel_light *by, kernel_light *light)
 {
     for (int c = 0; c < 3; c++) light->colour[c] = vf_select(m, by->colour[c], light->colour[c]);

@@ -26,7 +26,8 @@ typedef struct kernel_block_rays {
     float half_u, half_v;
 } kernel_block_rays;
 
-/* Computes the blocks' rays from those of the tile. The half widths are increased by a thousandth for rounding. */
+/* Computes the blocks' rays from those of the tile. The half widths and heights are enlarged by a factor of 1.001, so
+ * that rounding excludes no ray of a block. */
 static inline void kernel_block_rays_begin(kernel_block_rays *r, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
