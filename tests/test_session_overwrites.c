@@ -31,6 +31,11 @@ static const overwrite_case cases[] = {
      {{"out/./x_0.png", "image \"a\"", "image \"b\"", "{name}"}}},
     {"images:\n" IMAGE("a", "    once: true\n", "x_2.png") IMAGE("b", "", "x_{cycle}.png"),
      {{0}, {0}, {"x_2.png, written at cycle 0 by image \"a\"", "image \"b\"", "cycle 2", "{name}"}}},
+    {"images:\n" IMAGE("a", "    once: true\n", "1x1.png") IMAGE("b", "", "{cycle}x{cycle}.png")
+         IMAGE("c", "    every: 2\n", "{time:.0f}x1.png"),
+     {{0},
+      {"1x1.png, written at cycle 0 by image \"a\""},
+      {"1x1.png, written at cycle 1 by image \"b\"", "image \"c\"", "cycle 2"}}},
     {"images:\n" IMAGE("a", "    camera: {orbit: {views: 2}}\n", "x_{view}.png"),
      {{0}, {"x_0.png", "cycle 0", "cycle 1", "{cycle}"}}},
     {"images:\n" IMAGE("a", "    camera: {orbit: {views: 2}}\n", "x_{view}_{cycle}.png"), {{0}}},

@@ -58,14 +58,19 @@ static size_t rounded(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
+static void *replace_buffer(char **buffer, size_t *held, size_t bytes)
+{
+    base_free(*buffer);
+    *buffer = base_alloc(rounded(bytes));
+    *held = *buffer ? bytes : 0;
+    return *buffer;
+}
+
+/* Makes the buffer hold at least `bytes` bytes. Its contents are lost if it is enlarged, which adds half of `bytes`, so
+ * that it is seldom enlarged. */
 static void *ensure_buffer_size(char **buffer, size_t *held, size_t bytes)
 {
-    if (bytes <= *held) return *buffer;
-    base_free(*buffer);
-    *held = 0;
-    *buffer = base_alloc(rounded(bytes + bytes / 2));
-    if (*buffer) *held = bytes + bytes / 2;
-    return *buffer;
+    return bytes <= *held ? *buffer : replace_buffer(buffer, held, bytes + bytes / 2);
 }
 
 void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
@@ -80,8 +85,9 @@ static void *store_alloc(polyhedron_store *store, size_t bytes)
     if (store->memory_bytes - store->used < bytes) {
         const size_t twice = store->memory_bytes ? 2 * store->memory_bytes : STORE_BYTES;
         const size_t wanted = twice < STORE_LIMIT ? twice : store->memory_bytes;
+        const size_t needed = wanted > bytes ? wanted : bytes;
         polyhedra_reset(store);
-        if (!ensure_buffer_size(&store->memory, &store->memory_bytes, wanted > bytes ? wanted : bytes)) return NULL;
+        if (needed > store->memory_bytes && !replace_buffer(&store->memory, &store->memory_bytes, needed)) return NULL;
     }
     store->used += bytes;
     return store->memory + store->used - bytes;

@@ -38,14 +38,22 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the index of an output whose last picture was written to this file, or -1 if there is none. `file` is the
- * hash of the file's path. A picture that the output `output` itself wrote at the same cycle is ignored, because in
- * that case the step was repeated. */
-static int find_output_that_wrote_file(const session_overwrites *all, uint64_t file, int output, long long cycle)
+/* Returns the record of a file, of which `file` is the hash of its path, or NULL if there is none. A picture that the
+ * output `output` itself wrote at the same cycle is ignored, because in that case the step was repeated. */
+static session_written *find_record_of_file(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
+    for (session_written *it = all->last_files; it < all->last_files + all->count; it++)
+        if (it->file == file && (it->output != output || it->cycle != cycle)) return it;
+    return NULL;
+}
+
+/* Records that the output has written a picture to the file. Records of other outputs with this file are changed, too,
+ * because their pictures are overwritten. */
+static void record_file(session_overwrites *all, uint64_t file, int output, long long cycle)
+{
+    all->last_files[output].file = file;
     for (int i = 0; i < all->count; i++)
-        if (all->last_files[i].file == file && (i != output || all->last_files[i].cycle != cycle)) return i;
-    return -1;
+        if (all->last_files[i].file == file) all->last_files[i] = (session_written){file, cycle, output};
 }
 
 /* Returns the advice at the end of the warning: how to avoid the overwriting. */
@@ -57,14 +65,14 @@ static const char *get_overwrite_advice(const scene_image *image, const scene_im
     return "give each of its pictures a path of its own";
 }
 
-static void warn_of_overwrite(const session_overwrites *all, const scene *scene, const scene_image *image, int output,
-                              int before, const char *path, long long cycle, session_report *report)
+static void warn_of_overwrite(const session_written *before, const scene *scene, const scene_image *image, int output,
+                              const char *path, long long cycle, session_report *report)
 {
-    const scene_image *earlier = find_image_with_output(scene, before);
+    const scene_image *earlier = find_image_with_output(scene, before->output);
     session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
                  "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
-                 image->name, path, all->last_files[before].cycle, earlier->name, cycle,
-                 get_overwrite_advice(image, earlier, before == output));
+                 image->name, path, before->cycle, earlier->name, cycle,
+                 get_overwrite_advice(image, earlier, before->output == output));
 }
 
 static bool reserve_entries(session_overwrites *all, const scene *scene)
@@ -91,9 +99,9 @@ void session_record_written_files(session_overwrites *all, const scene *scene, i
         char *path = scene_expand_placeholders(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);
-        const int before = find_output_that_wrote_file(all, file, first + i, cycle);
-        if (before >= 0) warn_of_overwrite(all, scene, drawn, first + i, before, path, cycle, report);
-        all->last_files[first + i] = (session_written){file, cycle};
+        const session_written *before = find_record_of_file(all, file, first + i, cycle);
+        if (before) warn_of_overwrite(before, scene, drawn, first + i, path, cycle, report);
+        record_file(all, file, first + i, cycle);
         base_free(path);
     }
 }

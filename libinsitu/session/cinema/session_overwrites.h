@@ -8,15 +8,17 @@
 #include "scene.h"
 #include "session_report.h"
 
-/* The picture that an output has written most recently. */
+/* The file to which an output has written its most recent picture, and the output and the cycle that have written this
+ * file most recently. The output is another one if it has overwritten the picture. */
 typedef struct session_written {
-    uint64_t file; /* hash of the picture's path; 0: no picture has been written yet */
+    uint64_t file; /* hash of the file's path; 0: no picture has been written yet */
     long long cycle;
+    int output;
 } session_written;
 
 typedef struct session_overwrites {
     int count;                   /* number of outputs of the scene, over all views, isovalues and fields */
-    session_written *last_files; /* for each output, the picture that it has written most recently */
+    session_written *last_files; /* for each output, the file of its most recent picture */
 } session_overwrites;
 
 /* Records the files that the image with this index has written at this cycle and time. If a path was already used for
