@@ -271,6 +271,32 @@ void points_that_move_keep_their_cells(void **)
     expect_step("moving.vtkhdf", 1, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
 }
 
+/* Checks a step that reuses the cells of the second step. The first step has no cells, but has an entry in the list of
+ * offsets. */
+void cells_are_found_behind_a_step_without_cells(void **)
+{
+    {
+        writer w("late.vtkhdf", "UnstructuredGrid");
+        lists all, later;
+        add_part(all, 0, 0, 0, 0);
+        add_part(all, 0, 3, 0, 0);
+        add_part(later, 5, 3, 1, 1);
+        all.points.insert(all.points.end(), later.points.begin(), later.points.end());
+        all.f.insert(all.f.end(), later.f.begin(), later.f.end());
+        all.point_counts.push_back(24);
+        all.cell_counts.push_back(3);
+        all.id_counts.push_back(24);
+        w.write_dataset(all);
+        w.write_steps({0, 1, 2});
+        w.write_dataset("Steps/PartOffsets", numbers{0, 1, 2});
+        w.write_dataset("Steps/PointOffsets", numbers{0, 0, 24});
+        w.write_dataset("Steps/CellOffsets", numbers{0, 0, 0});
+        w.write_dataset("Steps/ConnectivityIdOffsets", numbers{0, 0, 0});
+    }
+    expect_step("late.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 0..3 c 0..2; ");
+    expect_step("late.vtkhdf", 2, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
+}
+
 void unsupported_types_are_refused_by_name(void **)
 {
     for (const char *type :
@@ -321,6 +347,7 @@ int main()
         cmocka_unit_test(steps_of_a_mesh_that_changes_are_read_one_by_one),
         cmocka_unit_test(steps_of_values_share_their_mesh),
         cmocka_unit_test(points_that_move_keep_their_cells),
+        cmocka_unit_test(cells_are_found_behind_a_step_without_cells),
         cmocka_unit_test(unsupported_types_are_refused_by_name),
     };
     return cmocka_run_group_tests(tests, set_up_test_group, nullptr);

@@ -308,12 +308,16 @@ class hdf_grids : public data_file
 
     /* Returns the difference between a part's first index in the file's list of offsets and its first index in the list
      * of cells. Each earlier part increases the difference by 1, because it has one more offset than cells. Parts that
-     * reuse the cells of an earlier step have no entries in either list, and are not counted. */
+     * reuse the cells of an earlier step have no entries in either list, and are not counted. Parts without cells are
+     * counted, even directly before a part with cells. */
     int64_t count_extra_offsets(const part_position &at) const
     {
         int64_t parts = 0;
-        for (int64_t cells = 0; parts < at.part && cells < at.cell; parts++)
-            cells += in_.number("/VTKHDF/NumberOfCells", parts);
+        for (int64_t cells = 0; parts < at.part; parts++) {
+            const int64_t count = in_.number("/VTKHDF/NumberOfCells", parts);
+            if (cells >= at.cell && (count > 0 || at.cells == 0)) break;
+            cells += count;
+        }
         return parts;
     }
 
