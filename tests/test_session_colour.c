@@ -221,6 +221,92 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
     remove_ranges();
 }
 
+/* Checks that a layer goes on with its range in the file although another layer of its type is added before it, and
+ * that a logarithmic scale does not use a range in the file that reaches 0. */
+static void ranges_over_a_run_survive_edits(void **state)
+{
+    (void)state;
+    static const char *const keys[][2] = {{"range: [-3, 3]", "range: run"},
+                                          {"scale: log, range: data", "scale: log, range: run"}};
+    for (int i = 0; i < 2; i++) {
+        caught_picture pictures[2];
+        for (int is_run = 0; is_run < 2; is_run++) {
+            char text[1024];
+            FILE *file = own_rank == 0 ? fopen(make_ranges_file_name(), "w") : NULL;
+            if (file) fprintf(file, "slice 0 -2 -3 3 f\n");
+            if (file) fclose(file);
+            snprintf(text, sizeof text,
+                     "images:\n  - name: %s\n    size: [40, 30]\n    layers:\n"
+                     "      - slice: {field: f, component: magnitude, range: run, planes: {normal: x}}\n"
+                     "      - slice: {field: f, %s}\n    outputs: [{path: \"%s/a.exr\"}]\n",
+                     image_name, keys[i][is_run], folder);
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+            everywhere(submit_input(session, &block) == INSITU_OK);
+            pictures[is_run] = draw_step(session, 0);
+            insitu_destroy(&session);
+            remove_ranges();
+        }
+        assert_similar_pictures(&pictures[0], &pictures[1], 1e-6);
+    }
+}
+
+/* Checks ranges over a run in an image that has no outputs, and so no file: a second, narrower step is drawn with the
+ * range of the first. */
+static void ranges_over_a_run_need_no_file(void **state)
+{
+    (void)state;
+    float *pixels[2] = {NULL, NULL};
+    enum { WIDTH = 40, HEIGHT = 30, CHANNELS = 4 };
+    const size_t bytes = sizeof(float) * WIDTH * HEIGHT * CHANNELS;
+    const truth t = compute_exact_ranges();
+    free(t.middles);
+    for (int is_run = 0; is_run < 2; is_run++) {
+        char text[1024], range[128] = "run";
+        if (!is_run) snprintf(range, sizeof range, "[%.17g, %.17g]", t.least, t.most);
+        snprintf(text, sizeof text, "images: [{name: a, size: [%d, %d], layers: [{slice: {field: f, range: %s}}]}]\n",
+                 WIDTH, HEIGHT, range);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+        everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
+        everywhere(submit_input(session, &block) == INSITU_OK);
+        everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+        scale_values(&block, 0.5);
+        everywhere(submit_input(session, &block) == INSITU_OK);
+        everywhere(insitu_step(session, 1, 1) == INSITU_OK);
+        scale_values(&block, 2);
+        const insitu_picture *picture = insitu_last_pictures(session, NULL);
+        everywhere((picture != NULL) == (own_rank == 0));
+        pixels[is_run] = malloc(bytes);
+        assert_non_null(pixels[is_run]);
+        if (picture) memcpy(pixels[is_run], picture->rgba, bytes);
+        insitu_destroy(&session);
+    }
+    everywhere(own_rank != 0 || memcmp(pixels[0], pixels[1], bytes) == 0);
+    free(pixels[0]), free(pixels[1]);
+}
+
+/* Checks that two images whose ranges would be kept in one file are reported. */
+static void images_with_one_file_of_ranges_are_reported(void **state)
+{
+    (void)state;
+    char text[2048];
+    snprintf(text, sizeof text,
+             "images:\n"
+             "  - {name: %s, size: [8, 6], sweep: {planes: true}, layers: [{slice: {field: f, range: run, planes: "
+             "{normal: x, count: 2}}}],\n"
+             "     outputs: [{path: \"%s/{name}_{plane}.png\"}]}\n"
+             "  - {name: %s.1, size: [8, 6], layers: [{slice: {field: f, range: run}}],\n"
+             "     outputs: [{path: \"%s/b.png\"}]}\n",
+             image_name, folder, image_name, folder);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+    everywhere(submit_input(session, &block) == INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    check_reported_everywhere(session, status, INSITU_ERROR_SCENE, ".1\": its ranges of the run", ".1.ranges",
+                              "give one of the two another name");
+    insitu_destroy(&session);
+    discard_pictures();
+    remove_ranges();
+}
+
 static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
 {
     (void)state;
@@ -392,6 +478,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
         cmocka_unit_test(opacity_points_follow_the_scale),
+        cmocka_unit_test(ranges_over_a_run_survive_edits),
+        cmocka_unit_test(ranges_over_a_run_need_no_file),
+        cmocka_unit_test(images_with_one_file_of_ranges_are_reported),
         cmocka_unit_test(broken_file_of_ranges_is_reported_on_all_ranks),
         cmocka_unit_test(maps_from_files_reach_every_rank),
         cmocka_unit_test(missing_and_broken_maps_are_reported_on_all_ranks),

@@ -17,10 +17,20 @@ typedef struct layer_list {
     session_run_range *items; /* the layers with ranges over the run; NULL: layers are only counted */
 } layer_list;
 
-static void append_layer_with_run_range(layer_list *list, const char *kind, int number, const scene_field *field,
+/* Returns whether the range belongs to a layer of this type that shows this component of the field. */
+static bool is_range_of(const session_run_range *range, const char *kind, const char *field, int component)
+{
+    return strcmp(range->kind, kind) == 0 && range->field->component == component &&
+           strcmp(range->field->name, field) == 0;
+}
+
+static void append_layer_with_run_range(layer_list *list, const char *kind, const scene_field *field,
                                         const scene_colour_map *map)
 {
+    int number = 0;
     if (map->range.is_fixed || map->range.source != SCENE_RANGE_RUN) return;
+    for (int i = 0; list->items && i < list->count; i++)
+        number += is_range_of(&list->items[i], kind, field->name, field->component);
     if (list->items) list->items[list->count] = (session_run_range){kind, number, field, map, INFINITY, -INFINITY};
     list->count++;
 }
@@ -30,17 +40,16 @@ static void list_layers_with_run_ranges(const scene_image *image, layer_list *li
     for (int i = 0; i < image->isosurface_count; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
         if (layer->has_colour_by)
-            append_layer_with_run_range(list, "isosurface", i, &layer->colour_by, &layer->colour_map);
+            append_layer_with_run_range(list, "isosurface", &layer->colour_by, &layer->colour_map);
     }
     for (int i = 0; i < image->surface_count; i++) {
         const scene_surface *layer = &image->surfaces[i];
-        if (layer->has_colour_by)
-            append_layer_with_run_range(list, "surface", i, &layer->colour_by, &layer->colour_map);
+        if (layer->has_colour_by) append_layer_with_run_range(list, "surface", &layer->colour_by, &layer->colour_map);
     }
     for (int i = 0; i < image->slice_count; i++)
-        append_layer_with_run_range(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
+        append_layer_with_run_range(list, "slice", &image->slices[i].field, &image->slices[i].colour_map);
     for (int i = 0; i < image->volume_count; i++)
-        append_layer_with_run_range(list, "volume", i, &image->volumes[i].field, &image->volumes[i].colour_map);
+        append_layer_with_run_range(list, "volume", &image->volumes[i].field, &image->volumes[i].colour_map);
 }
 
 static int count_layers_with_run_ranges(const scene_image *image)
@@ -60,6 +69,7 @@ static insitu_status fail_at_file(const session_image_ranges *ranges, const char
                      "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, failure->reason);
 }
 
+/* Returns NULL if memory runs out. The image must have an output. */
 static char *make_ranges_file_path(const scene_image *image)
 {
     const char *output = image->outputs[0].path;
@@ -72,12 +82,14 @@ static char *make_ranges_file_path(const scene_image *image)
     return path;
 }
 
+/* Stores the range of a line of the file for its layer. It is not stored if the layer's scale has become logarithmic
+ * and the range has values that this scale does not show. */
 static void store_line(session_image_ranges *ranges, const session_run_range *line, int component, const char *field)
 {
     for (int i = 0; i < ranges->count; i++) {
         session_run_range *layer = &ranges->items[i];
-        if (strcmp(layer->kind, line->kind) != 0 || layer->number != line->number) continue;
-        if (layer->field->component != component || strcmp(layer->field->name, field) != 0) continue;
+        if (layer->number != line->number || !is_range_of(layer, line->kind, field, component)) continue;
+        if (layer->map->scale == SCENE_LOG && !(line->low > 0)) continue;
         layer->low = line->low;
         layer->high = line->high;
     }
@@ -114,12 +126,13 @@ static insitu_status read_lines(session_image_ranges *ranges, const file_content
     return INSITU_OK;
 }
 
-/* Reads the file of ranges; a missing file is not an error. */
+/* Reads the file of ranges, if the image has one; a missing file is not an error. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
     c_locale numbers;
     file_content content;
     file_failure failure;
+    if (!ranges->path) return INSITU_OK;
     if (!file_read_written_by_library(ranges->path, MOST_BYTES, &content, &failure))
         return failure.is_missing ? INSITU_OK : fail_at_file(ranges, "read", &failure, error);
     insitu_status status = INSITU_OK;
@@ -147,7 +160,7 @@ static void write_lines(text_output *out, const void *what)
 
 insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error)
 {
-    if (!ranges->is_changed) return INSITU_OK;
+    if (!ranges->is_changed || !ranges->path) return INSITU_OK;
     file_failure failure;
     if (!text_file_replace(ranges->path, write_lines, ranges, &failure))
         return fail_at_file(ranges, "written", &failure, error);
@@ -179,6 +192,19 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
+/* Stores an error if two images would write the same file: the further pictures of the sweep of an image "a" use
+ * a.1.ranges, which is also the file of an image "a.1" in the same folder. */
+static void check_that_file_is_unique(const session_run_ranges *all, const session_image_ranges *entry,
+                                      base_error *error)
+{
+    for (int i = 0; i < all->count && entry->path; i++)
+        if (all->items[i].path && strcmp(all->items[i].path, entry->path) == 0)
+            base_fail(error, INSITU_ERROR_SCENE,
+                      "image \"%s\": its ranges of the run would be kept in %.300s, which keeps those of image \"%s\"; "
+                      "give one of the two another name",
+                      entry->image, entry->path, all->items[i].image);
+}
+
 /* Initializes all->items[all->count] for the image, without ranges. The caller increments all->count when the ranges
  * have been read. */
 static bool append_empty_image_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
@@ -190,11 +216,14 @@ static bool append_empty_image_ranges(session_run_ranges *all, const scene_image
         session_image_ranges *entry = &items[all->count];
         *entry = (session_image_ranges){.image = base_strdup(image->name),
                                         .layers = image->variant.layers,
-                                        .path = make_ranges_file_path(image),
+                                        .path = image->output_count ? make_ranges_file_path(image) : NULL,
                                         .count = count,
                                         .items = base_calloc((size_t)count, sizeof *entry->items)};
         if (entry->items) list_layers_with_run_ranges(image, &(layer_list){0, entry->items});
-        if (entry->image && entry->path && entry->items) return true;
+        if (entry->image && (entry->path || !image->output_count) && entry->items) {
+            check_that_file_is_unique(all, entry, error);
+            return true;
+        }
         free_ranges(entry);
     }
     session_fail_for_memory(error, (int64_t)sizeof *items, "ranges of a run");

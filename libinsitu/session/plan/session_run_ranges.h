@@ -5,9 +5,9 @@
  * output: the part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
  * NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became wider, and
  * read when the first picture of the image is drawn, so that a restarted run continues with the ranges of the previous
- * one. A line contains, in this order: the layer's type (isosurface, surface, slice or volume); the layer's index, from
- * 0, among the image's layers of this type; the field's component (scene_field.component); the low and the high end of
- * the range; and the field's name. Lines that match no layer of the image are ignored. */
+ * one. If the image has no outputs, there is no file. A line contains, in this order: the layer's type (isosurface,
+ * surface, slice or volume); an index (session_run_range.number); the field's component (scene_field.component); the
+ * low and the high end of the range; and the field's name. Lines that match no layer of the image are ignored. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -18,14 +18,16 @@
 /* The widest range of a layer over the run; its pointers refer to the scene. */
 typedef struct session_run_range {
     const char *kind; /* type of the layer, as written in the file of ranges: isosurface, surface, slice or volume */
-    int number;       /* index of the layer, from 0, among the image's layers of this type */
+    /* index of the layer, from 0, among the image's layers of this type that show the same component of the same field
+     * and have a range over the run, so that it does not change if other layers are added */
+    int number;
     const scene_field *field;
     const scene_colour_map *map;
     double low, high; /* ends of the range, the same on all ranks; low > high: there is no range yet */
 } session_run_range;
 
 typedef struct session_image_ranges {
-    char *image, *path; /* name of the image, and path of the file that keeps its ranges */
+    char *image, *path; /* name of the image, and path of the file that keeps its ranges; NULL: it has no outputs */
     /* If the image has a sweep: index of the combination of field, isovalue and plane to which the ranges belong
      * (scene_variant.layers). 0 without a sweep. */
     int layers;

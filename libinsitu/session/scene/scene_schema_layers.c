@@ -114,13 +114,15 @@ static const scene_form range_forms[] = {
     X(NUMBERS("above", type, colours.above, 3), .help = "Colour of values above the range, sRGB.",                     \
       .default_text = "the colour at the high end of the map", .low = 0, .high = 1)                                    \
     X(FORMS("range"),                                                                                                  \
-      .help = "The values `[low, high]`, low < high, at the ends of the colour map. Values outside get the colours "   \
-              "of the ends. Instead of numbers, the range can be computed from the values on the meshes of the "       \
-              "layer, over all ranks, at each drawn step. `data`: from the least to the greatest value (with `scale: " \
-              "log` from the least value above 0). `symmetric`: the same, but equally wide on both sides of 0. "       \
-              "`run`: the widest range of all steps drawn so far. It is kept in the file NAME.ranges beside the "      \
-              "first output's pictures (for the other pictures of a sweep in NAME.1.ranges and so on). So a run that " \
-              "is started again goes on with it. Delete the file to begin anew. A mapping gives percentiles.",         \
+      .help =                                                                                                          \
+          "The values `[low, high]`, low < high, at the ends of the colour map. Values outside get the colours "       \
+          "of the ends. Instead of numbers, the range can be computed from the values on the meshes of the "           \
+          "layer, over all ranks, at each drawn step. `data`: from the least to the greatest value (with `scale: "     \
+          "log` from the least value above 0). `symmetric`: the same, but equally wide on both sides of 0. "           \
+          "`run`: the widest range of all steps drawn so far. It is kept in the file NAME.ranges beside the "          \
+          "first output's pictures (for the other pictures of a sweep in NAME.1.ranges and so on). So a run that "     \
+          "is started again goes on with it. Delete the file to begin anew. An image without outputs has no file. "    \
+          "With `scale: log` a kept range that reaches 0 is dropped. A mapping gives percentiles.",                    \
       .default_text = RANGE_DEFAULT, TAKES(range_forms))
 #define CLIP_PLANE_KEYS(X)                                                                                             \
     X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
