@@ -3,6 +3,7 @@
  * samples of each pixel, and then the samples, which it stores directly at their final position. */
 #include "comp_deep.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "comp_agree.h"
@@ -44,6 +45,16 @@ static void add_interval(void *state, const fragment *f)
     list->samples[list->sample_count++] = sample;
 }
 
+/* Moves the begins of samples so that none is in front of the end of the previous sample. Only rounding places it
+ * there: a segment may begin slightly in front of the surface at which it begins (comp_merge_folded_pixel()). */
+static void separate_samples(insitu_deep_sample *samples, int64_t count)
+{
+    for (int64_t i = 1; i < count; i++) {
+        samples[i].z = fmaxf(samples[i].z, samples[i - 1].z_back);
+        samples[i].z_back = fmaxf(samples[i].z_back, samples[i].z);
+    }
+}
+
 void comp_deep_add_pixel(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded)
 {
     const int64_t first = list->sample_count;
@@ -57,6 +68,7 @@ void comp_deep_add_pixel(comp_deep_list *list, fragment *sorted, int64_t count, 
         comp_merge_folded_intervals(sorted, count, add_interval, list);
     else
         comp_merge_intervals(sorted, count, add_interval, list);
+    if (list->samples) separate_samples(list->samples + first, list->sample_count - first);
     list->pixels[list->pixel_count++] = (comp_deep_pixel){sorted->pixel, (uint32_t)(list->sample_count - first)};
 }
 

@@ -125,11 +125,17 @@ static bool have_two_samples_of_one_volume(const fragment *samples, int64_t coun
  * not include that header. */
 static const float face_error = 4e-6f;
 
+/* Returns the least t that a crossing may have with the face that a ray crosses at t. */
+static float subtract_face_error(float t)
+{
+    return t - face_error * fmaxf(fabsf(t), 1);
+}
+
 /* Advances *next past all fragments that begin before t by more than the rounding error of the t at which a ray crosses
  * a face. Returns the largest t_out of the volume fragments that were passed, or `reach` if it is larger. */
 static float find_furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
-    const float begin = t - face_error * fmaxf(fabsf(t), 1);
+    const float begin = subtract_face_error(t);
     for (; sorted[*next].t_in < begin; ++*next)
         if (sorted[*next].kind < FRAGMENT_SURFACE) reach = fmaxf(reach, sorted[*next].t_out);
     return reach;
@@ -357,10 +363,30 @@ static bool is_hidden_behind(float transmittance, const fragment *before, const 
                                   fragment_interval_number(before->t_in) != fragment_interval_number(next->t_in));
 }
 
+/* Returns whether the segment begins at the face on which the surface lies, and ends behind it, although rounding may
+ * place the surface slightly behind the segment's begin. Samples are not segments: their t_in and t_out are equal. */
+static bool begins_at_surface(const fragment *segment, const fragment *surface)
+{
+    return segment->kind < FRAGMENT_SURFACE && segment->t_in >= subtract_face_error(surface->t_in) &&
+           segment->t_out > surface->t_in;
+}
+
+/* Sorts fragments by depth, and moves surfaces in front of the segments that begin at them. */
+static void sort_with_surfaces_at_faces(fragment *items, int64_t count)
+{
+    heap_sort(items, count);
+    for (int64_t i = 1; i < count; i++)
+        for (int64_t to = i;
+             items[to].kind >= FRAGMENT_SURFACE && to > 0 && begins_at_surface(&items[to - 1], &items[to]); to--)
+            swap_fragments(items, to - 1, to);
+}
+
+/* The order is that of sort_with_surfaces_at_faces(), which does not depend on which rank has the surface and which the
+ * segment. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth)
 {
-    heap_sort(items, count);
+    sort_with_surfaces_at_faces(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_hidden_behind(transmittance, &items[i - 1], &items[i])); i += n) {

@@ -35,6 +35,9 @@ typedef struct image_case {
     "      - isosurface: {field: f, values: [-0.4, 0.4], normals: differences, difference: 2.5, opacity: 0.4,\n"       \
     "                     colour_by: {field: c, range: [-1, 1]}}\n"
 #define OTHER "      - volume: {field: f, map: plasma, opacity: [[0, 0.4], [1, 0]]}\n"
+#define INNER "      - surface: {threshold: {field: c, from: 0}, opacity: 0.4, colour_by: {field: f, range: [-1, 1]}}\n"
+#define SOLID "      - surface: {threshold: {field: c, from: 0}}\n"
+#define WITHIN "    camera: {position: [0.11, 0.07, 0.23], focal: [1, 0.3, 0.1], angle: 90}\n"
 #define LIT "    shadows: true\n    ambient_occlusion: {samples: 8}\n"
 
 static const image_case listed[] = {
@@ -59,6 +62,8 @@ static const image_case listed[] = {
     {"max_error", TO_A_MILLIONTH, VOLUME, "max_error: 0.01", NULL},
     {"volume, surfaces", TO_A_MILLIONTH, VOLUME CLEAR, "max_error: 0.01", NULL},
     {"samples, surfaces", TO_A_MILLIONTH, VOLUME CLEAR, "method: samples", NULL},
+    {"volume, faces inside", TO_A_MILLIONTH, VOLUME INNER, "max_error: 0.01", WITHIN},
+    {"volume, opaque faces inside", TO_A_MILLIONTH, VOLUME SOLID, "max_error: 0.01", WITHIN},
     {"two volumes", TO_A_MILLIONTH, VOLUME OTHER, "method: samples", NULL},
     {"samples, reproducible", TO_THE_BIT, VOLUME, "method: samples, reproducible: true", NULL},
     {"segments, reproducible", TO_THE_BIT, VOLUME, "method: segments, reproducible: true", NULL},
@@ -66,6 +71,11 @@ static const image_case listed[] = {
     {"max_error 1e-3, reproducible", TO_THE_BIT, VOLUME, "max_error: 0.001, reproducible: true", NULL},
     {"volume, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "max_error: 0.01, reproducible: true", NULL},
     {"samples, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "method: samples, reproducible: true", NULL},
+    {"segments, faces inside, reproducible", TO_THE_BIT, VOLUME INNER, "method: segments, reproducible: true", WITHIN},
+    {"volume, faces inside, reproducible", TO_THE_BIT, VOLUME INNER, "max_error: 0.01, reproducible: true", WITHIN},
+    {"samples, faces inside, reproducible", TO_THE_BIT, VOLUME INNER, "method: samples, reproducible: true", WITHIN},
+    {"volume, opaque faces inside, reproducible", TO_THE_BIT, VOLUME SOLID, "max_error: 0.01, reproducible: true",
+     WITHIN},
     {"two volumes, reproducible", TO_THE_BIT, VOLUME OTHER, "method: samples, reproducible: true", NULL},
     {"two volumes, max_error, reproducible", TO_THE_BIT, VOLUME OTHER, "max_error: 0.01, reproducible: true", NULL},
 };

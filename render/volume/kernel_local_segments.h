@@ -102,6 +102,43 @@ kernel_local_find_next_cut(const kernel_tile_trace *t, const kernel_tile_segment
     return next;
 }
 
+/* The following two functions determine which parts of an interval become segments. last: depth of the opaque surface
+ * or of the clip behind which there are none. If pictures must be the same on any partition (render_job.reproducible),
+ * a surface on the face at which the interval begins or ends does not cut it, because the surface may belong to another
+ * rank, which then has the same interval uncut. Rounding may place such a surface within the interval. Compositing
+ * decides by the same error bound whether a segment begins at a surface (begins_at_surface() in comp_merge.c).
+ *
+ * kernel_local_find_last_begin() returns the depths in front of which segments must begin if they are to be added.
+ * kernel_local_find_segment_ends() returns the depths at which segments from `from` on end: at the first transparent
+ * surface, at `last`, or at the interval's end (t_out). */
+SIMD_INLINE vf kernel_local_find_last_begin(const kernel_tile_trace *t, vf t_out, vf last)
+{
+    if (!t->frame->job->reproducible) return last;
+    const vm ends_behind = vm_and(vf_lt(last, t_out - kernel_face_depth_error(t_out)), vf_lt(last, vf_set(INFINITY)));
+    return vf_select(ends_behind, last - kernel_face_depth_error(last), last);
+}
+
+static __attribute__((noinline)) vf kernel_local_find_segment_ends(const kernel_tile_trace *t,
+                                                                   const kernel_tile_segments *b, vi places, vm rays,
+                                                                   vf from, vf t_out, vf last)
+{
+    if (!t->frame->job->reproducible)
+        return vf_min(vf_min(t_out, last), kernel_local_find_next_cut(t, b, places, rays, from));
+    const vf cut = vf_min(last, kernel_local_find_next_cut(t, b, places, rays, from + kernel_face_depth_error(from)));
+    return vf_select(vf_lt(cut, t_out - kernel_face_depth_error(t_out)), cut, t_out);
+}
+
+/* Returns the rays whose interval from t_in to t_out is cut by a surface or a clip, or lies outside the depths reach[0]
+ * and reach[1]. places: position of each ray among the tile's packets. */
+SIMD_INLINE vm kernel_local_find_cut_intervals(const kernel_tile_trace *t, const kernel_tile_segments *b, vi places,
+                                               vm rays, vf t_in, vf t_out, const vf reach[2])
+{
+    const vm cut = vm_or(vf_lt(t_in, reach[0]), vf_lt(reach[1], t_out));
+    if (!b->has_cuts && !vm_any(vm_and(rays, cut))) return cut;
+    const vf end = kernel_local_find_segment_ends(t, b, places, rays, t_in, t_out, reach[1]);
+    return vm_or(vf_lt(t_in, reach[0]), vm_or(vf_le(reach[1], t_in), vf_lt(end, t_out)));
+}
+
 /* Cuts intervals of rays at surfaces, and adds the resulting segments that lie between the depths reach[0] and reach[1]
  * and begin in the rays' windows. i: the intervals of the given rays, on which the field must be linear; whole: the
  * same intervals as segments; places: position of each ray among the tile's packets. */
@@ -109,10 +146,11 @@ static __attribute__((noinline)) void kernel_add_linear_segments(const kernel_ti
                                                                  vi places, vm rays, const kernel_interval *i,
                                                                  const vf reach[2], const kernel_unit_segment *whole)
 {
-    const vf begin = vf_gather(s->window, 2 * places), end = vf_min(i->t_out, reach[1]);
+    const vf begin = vf_gather(s->window, 2 * places),
+             end = vf_min(i->t_out, kernel_local_find_last_begin(t, i->t_out, reach[1]));
     vf from = vf_max(i->t_in, reach[0]);
     for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-        const vf to = vf_min(end, kernel_local_find_next_cut(t, s, places, open, from));
+        const vf to = kernel_local_find_segment_ends(t, s, places, open, from, i->t_out, reach[1]);
         const kernel_unit_segment part =
             kernel_cut_part_of_unit_segment(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
         kernel_segments_add(s->packets, false, s->is_double, places, vm_and(open, vf_le(begin, from)), from, to, &part);
@@ -292,7 +330,7 @@ static __attribute__((noinline)) void kernel_add_segments_in_current_cell(kernel
     const int count = kernel_curved_intervals(p, c, rays, intervals);
     if (count && map && lane < 0) kernel_local_set_bounds_of_single_cell(t->frame, b->volume, c, &own_bounds);
     for (int k = 0; k < count; k++) {
-        const vf end = vf_min(intervals[k].t_out, reach[1]);
+        const vf end = vf_min(intervals[k].t_out, kernel_local_find_last_begin(t, intervals[k].t_out, reach[1]));
         vf from = vf_max(intervals[k].t_in, reach[0]);
         vm open = vm_and(intervals[k].mask, vf_lt(from, end));
         chord.interval = &intervals[k];
@@ -301,7 +339,7 @@ static __attribute__((noinline)) void kernel_add_segments_in_current_cell(kernel
             continue;
         }
         for (; vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-            const vf to = vf_min(end, kernel_local_find_next_cut(t, b, whole.rays.at, open, from));
+            const vf to = kernel_local_find_segment_ends(t, b, whole.rays.at, open, from, intervals[k].t_out, reach[1]);
             const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
             whole.ends[0].t = from;
             whole.ends[1].t = from = to;
@@ -350,13 +388,14 @@ SIMD_INLINE void kernel_local_add_cut_segments_of_type(kernel_tile_trace *t, ker
                                                        int type)
 {
     const kernel_local_cells *cells = &t->thread->tile_cells->maps;
-    const vf end = vf_min(whole->ends[1].t, reach[1]);
+    const vf end = vf_min(whole->ends[1].t, kernel_local_find_last_begin(t, whole->ends[1].t, reach[1]));
     kernel_local_pairs part = *whole;
     kernel_local_chord chord;
     kernel_local_compute_chords(cells, &b->bounds, whole->rays.lane, whole->ends, type, &chord);
     vf from = vf_max(whole->ends[0].t, reach[0]);
     for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
-        const vf between[2] = {from, vf_min(end, kernel_local_find_next_cut(t, b, whole->rays.at, open, from))};
+        const vf between[2] = {
+            from, kernel_local_find_segment_ends(t, b, whole->rays.at, open, from, whole->ends[1].t, reach[1])};
         vm alone = vm_none();
         for (int n = 0; n < 2; n++)
             alone = vm_or(alone,
@@ -432,10 +471,8 @@ SIMD_INLINE void kernel_local_add_segments_of_listed_rays(kernel_tile_trace *t, 
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
-    vm cut = vm_or(vf_lt(p.ends[0].t, reach[0]), vf_lt(reach[1], p.ends[1].t));
-    if (b->has_cuts)
-        cut = vm_or(cut, vf_lt(kernel_local_find_next_cut(t, b, p.rays.at, p.active, p.ends[0].t), p.ends[1].t));
-    cut = vm_and(cut, p.active);
+    const vm cut =
+        vm_and(p.active, kernel_local_find_cut_intervals(t, b, p.rays.at, p.active, p.ends[0].t, p.ends[1].t, reach));
     if (__builtin_expect(vm_any(cut), 0)) kernel_local_add_cut_segments(t, b, &p, cut, reach, type);
     p.active = vm_andnot(p.active, cut);
     kernel_local_compute_deviations(&cells->maps, &b->bounds, &p, type);

@@ -51,6 +51,13 @@ SIMD_INLINE kernel_blend kernel_blend_begin(void)
     return (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
 }
 
+/* Returns the error bound of the depth t at which a ray crosses a face. render_fold.c and comp_merge.c use the same
+ * bound. */
+SIMD_INLINE vf kernel_face_depth_error(vf t)
+{
+    return vf_max(vf_abs(t), vf_set(1)) * RENDER_FACE_ERROR;
+}
+
 /* The samples of a packet's rays in a window. A value is NaN as long as no cell of this rank has been found that
  * contains the sample. */
 typedef struct kernel_samples {
@@ -130,7 +137,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
         kernel_append_fragments(p, mask, FRAGMENT_VOLUME, &sample);
         return;
     }
-    const vf error = vf_max(vf_abs(t), vf_set(1)) * RENDER_FACE_ERROR;
+    const vf error = kernel_face_depth_error(t);
     const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
     const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
     const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)s->volume;

@@ -46,23 +46,22 @@
 
 /* ---- blending a ray's segments ---- */
 
-/* Returns t_out minus the error bound of the depths at which rays cross faces. An interval whose computed begin is less
- * than this depth certainly begins in front of t_out. render_fold.c uses the same margin. */
-SIMD_INLINE vf kernel_subtract_crossing_error(vf t_out)
-{
-    return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
-}
-
 /* Returns the rays whose current fragment must end before the segment from t_in to t_out is added: a surface or a gap
  * lies between, or the segment's cell overlaps the previous one by more than rounding. (Compositing detects overlapping
  * cells by their overlapping fragments, render.h.) */
 SIMD_INLINE vm kernel_segment_needs_new_fragment(const kernel_packet *p, const kernel_segments *list, vf t_in, vf t_out)
 {
-    const vf last = list->blend.t_last;
+    const vf last = list->blend.t_last, shorter = vf_min(t_out, last);
     vm broken = vm_not(vf_eq(t_in, last));
-    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_subtract_crossing_error(vf_min(t_out, last)));
-    if (list->cut) broken = vm_or(broken, vf_le(kernel_find_next_cut(p, list, last, false), t_in));
-    return broken;
+    if (p->frame->job->is_alone) broken = vf_le(t_in, shorter - kernel_face_depth_error(shorter));
+    vf from = last, to = t_in;
+    if (!list->cut) return broken;
+    if (p->frame->job->reproducible) {
+        /* a surface on the face between the two segments has cut neither of them (kernel_local_find_segment_ends()) */
+        from -= kernel_face_depth_error(last);
+        to += kernel_face_depth_error(t_in);
+    }
+    return vm_or(broken, vf_le(kernel_find_next_cut(p, list, from, false), to));
 }
 
 /* Ends the current fragments of the rays in `mask`. Their last depth, t_last, is reduced by the error bound of
@@ -71,7 +70,7 @@ SIMD_INLINE vm kernel_segment_needs_new_fragment(const kernel_packet *p, const k
 SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vf end = b->t_last;
-    b->t_last = kernel_subtract_crossing_error(end);
+    b->t_last = end - kernel_face_depth_error(end);
     kernel_blend_close(p, b, mask);
     b->t_last = end;
 }

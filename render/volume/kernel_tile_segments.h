@@ -99,7 +99,7 @@ SIMD_INLINE void kernel_add_segments_of_tet_pairs(kernel_tile_trace *t, kernel_t
     kernel_segments *lists = is_uniform ? &s->packets[pairs->packet] : s->packets;
     const vi places = r->at;
     kernel_interval i;
-    vf begin, end, near, far;
+    vf begin, end, reach[2];
     vm hit[4];
     if (is_uniform)
         begin = lists->t_begin, end = lists->t_end;
@@ -110,13 +110,11 @@ SIMD_INLINE void kernel_add_segments_of_tet_pairs(kernel_tile_trace *t, kernel_t
                                              hit, &i);
     if (!vm_any(i.mask)) return;
     if (is_uniform)
-        near = t->packets[pairs->packet].t_near, far = lists->t_cut;
+        reach[0] = t->packets[pairs->packet].t_near, reach[1] = lists->t_cut;
     else
-        vf_gather_pair(s->reach, 2 * places, &near, &far);
+        vf_gather_pair(s->reach, 2 * places, &reach[0], &reach[1]);
     const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
-    vm cut = vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out));
-    if (s->has_cuts) cut = vm_or(cut, vf_lt(kernel_local_find_next_cut(t, s, places, met, i.t_in), i.t_out));
-    cut = vm_and(met, cut);
+    const vm cut = vm_and(met, kernel_local_find_cut_intervals(t, s, places, met, i.t_in, i.t_out, reach));
     const vm own = vm_and(vm_andnot(met, cut), vf_le(begin, i.t_in));
     if (!vm_any(vm_or(own, cut))) return;
     kernel_unit_segment run = kernel_unit_segment_of(i.t_out - i.t_in, i.v_in, i.v_out);
@@ -126,8 +124,7 @@ SIMD_INLINE void kernel_add_segments_of_tet_pairs(kernel_tile_trace *t, kernel_t
      * although both depths are the same float32 */
     kernel_segments_add(lists, is_uniform, s->is_double, places, vm_and(own, vf_lt(vf_set(0), run.length)), i.t_in,
                         i.t_out, &run);
-    if (__builtin_expect(vm_any(cut), 0))
-        kernel_add_linear_segments(t, s, places, cut, &i, (const vf[2]){near, far}, &run);
+    if (__builtin_expect(vm_any(cut), 0)) kernel_add_linear_segments(t, s, places, cut, &i, reach, &run);
 }
 
 /* Adds the segments in the current vector of tets. */
