@@ -442,6 +442,27 @@ void other_high_order_cells_are_drawn_as_linear_cells(void **)
     }
 }
 
+/* Checks Lagrange quads of which one has degrees that differ between its axes: only that one is drawn by its corners.
+ */
+void degrees_of_lagrange_cells_are_judged_cell_by_cell(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    vtkNew<vtkDoubleArray> degrees;
+    degrees->SetNumberOfComponents(3);
+    for (const auto &[i, j] : {std::pair{3, 3}, {1, 7}, {3, 3}}) {
+        std::vector<point> points(16);
+        for (size_t k = 0; k < 16; k++) points[k] = {0.1 * static_cast<double>(k), std::sin(k), 0};
+        add_cell(grid, VTK_LAGRANGE_QUADRILATERAL, points);
+        degrees->InsertNextTuple3(i, j, 0);
+    }
+    grid->GetCellData()->SetHigherOrderDegrees(degrees);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.cells_linear, 1);
+    const int types[] = {INSITU_LAGRANGE_QUAD, INSITU_QUAD, INSITU_LAGRANGE_QUAD};
+    for (int i = 0; i < 3; i++) assert_int_equal(read_integer(f.mesh().mesh.cell_types, i), types[i]);
+}
+
 void line_cells_are_skipped_with_their_values(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -952,6 +973,7 @@ int main()
         cmocka_unit_test(prisms_are_polyhedra_of_their_faces),
         cmocka_unit_test(bezier_cells_are_drawn_as_linear_cells_with_a_warning),
         cmocka_unit_test(cells_of_higher_order_are_submitted),
+        cmocka_unit_test(degrees_of_lagrange_cells_are_judged_cell_by_cell),
         cmocka_unit_test(other_high_order_cells_are_drawn_as_linear_cells),
         cmocka_unit_test(line_cells_are_skipped_with_their_values),
         cmocka_unit_test(shells_are_submitted),

@@ -458,6 +458,70 @@ void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
     }
 }
 
+/* Returns hexes of order 2 in a row along y, whose vertical edges are bent, and beside the last one a cell of the type
+ * `last`: a polyhedron or a polygon, or another hex. The point field "x" is the square of y. */
+vtkSmartPointer<vtkUnstructuredGrid> make_bent_hexes(int count, int last)
+{
+    constexpr int nodes[20][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {0, 0, 2}, {2, 0, 2}, {2, 2, 2},
+                                  {0, 2, 2}, {1, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 1, 0}, {1, 0, 2}, {2, 1, 2},
+                                  {1, 2, 2}, {0, 1, 2}, {0, 0, 1}, {2, 0, 1}, {2, 2, 1}, {0, 2, 1}};
+    auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkFloatArray> x;
+    x->SetName("x");
+    const int rows = 2 * count + 3;
+    for (int i = 0; i < 9 * rows; i++) {
+        const int at[3] = {i % 3, i / 3 % rows, i / 3 / rows};
+        points->InsertNextPoint(at[0] + (at[2] == 1 ? 0.4 : 0), at[1], at[2]);
+        x->InsertNextValue(static_cast<float>(at[1] * at[1]));
+    }
+    for (int cell = 0; cell <= count; cell++) {
+        vtkIdType ids[20];
+        for (int k = 0; k < 20; k++) ids[k] = nodes[k][0] + 3 * (nodes[k][1] + 2 * cell + rows * nodes[k][2]);
+        const vtkIdType faces[] = {4, ids[0], ids[3], ids[2], ids[1], 4, ids[4], ids[5], ids[6], ids[7],
+                                   4, ids[0], ids[1], ids[5], ids[4], 4, ids[1], ids[2], ids[6], ids[5],
+                                   4, ids[2], ids[3], ids[7], ids[6], 4, ids[3], ids[0], ids[4], ids[7]};
+        if (cell < count || last == VTK_QUADRATIC_HEXAHEDRON)
+            grid->InsertNextCell(VTK_QUADRATIC_HEXAHEDRON, 20, ids);
+        else if (last == VTK_POLYHEDRON)
+            grid->InsertNextCell(VTK_POLYHEDRON, 8, ids, 6, faces);
+        else
+            grid->InsertNextCell(last, 4, ids);
+    }
+    grid->SetPoints(points);
+    grid->GetPointData()->AddArray(x);
+    return grid;
+}
+
+/* Checks that hexes of order 2 are drawn by their corners on all ranks if only one rank has the polyhedron or polygon
+ * that is in one grid with them, and that they are not if that cell is in another block. */
+void higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks(void **)
+{
+    for (const int last : {VTK_POLYHEDRON, VTK_POLYGON}) {
+        write_vtu("beside.vtu", make_bent_hexes(5, last));
+        std::string first;
+        for (const std::string options : {"1", "2", "3", "3 --partition random"}) {
+            const run_result r = run_ranks(options[0] - '0', options.substr(1) + " scene.yaml beside.vtu");
+            expect_result(r, 0, "warning: 5 higher-order cells drawn by their corners as linear ones");
+            const std::string picture = read_file(make_path("a_00.exr"));
+            if (first.empty()) first = picture;
+            assert_true(picture == first && !picture.empty());
+        }
+    }
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, make_bent_hexes(5, VTK_QUADRATIC_HEXAHEDRON));
+    blocks->SetBlock(1, make_bent_hexes(0, VTK_POLYHEDRON));
+    vtkNew<vtkXMLMultiBlockDataWriter> writer;
+    writer->SetFileName(make_path("beside.vtm").c_str());
+    writer->SetInputData(blocks);
+    assert_int_equal(writer->Write(), 1);
+    for (const int ranks : {1, 2, 3}) {
+        const run_result r = run_ranks(ranks, "scene.yaml beside.vtm");
+        expect_result(r, 0, "1 step, 1 picture");
+        assert_false(r.contains_text("drawn by their corners"));
+    }
+}
+
 /* Checks that no cell is missing for each method of reading and distributing cells. */
 void every_distribution_mode_reads_all_cells(void **)
 {
@@ -497,6 +561,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(default_field_is_one_that_the_last_step_has),
         cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
+        cmocka_unit_test(higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(every_distribution_mode_reads_all_cells),
     };
     return cmocka_run_group_tests(tests, make_files, nullptr);

@@ -35,6 +35,8 @@ using namespace render_tool;
 namespace
 {
 
+const char *const mesh_name = "data";
+
 struct rank_info {
     MPI_Comm comm = MPI_COMM_WORLD;
     int rank = 0, ranks = 1;
@@ -102,10 +104,12 @@ class render_session
 
     /* Passes this rank's part of a step to the session. A part without drawable cells is not an error, because the rest
      * of the data may be on other ranks. */
-    insitu_vtk_report set(vtkDataObject *data)
+    insitu_vtk_report set(vtkDataObject *data, const std::vector<leaf_mesh> &leaves)
     {
+        for (const leaf_mesh &leaf : leaves)
+            (void)insitu_vtk_draw_by_corners(adaptor_, leaf.name.c_str(), leaf.has_faces);
         insitu_vtk_report report;
-        const insitu_status status = insitu_vtk_set(adaptor_, "data", data, &report);
+        const insitu_status status = insitu_vtk_set(adaptor_, mesh_name, data, &report);
         const bool has_no_cells = status == INSITU_ERROR_MESH && report.cells == 0 && report.cells_not_drawn > 0;
         if (status != INSITU_OK && !has_no_cells) throw std::runtime_error(insitu_vtk_error(adaptor_));
         return report;
@@ -127,6 +131,18 @@ class render_session
     insitu_session *session_ = nullptr;
     insitu_vtk_adaptor *adaptor_ = nullptr;
 };
+
+/* Makes all ranks agree which leaves have polygons or polyhedra, beside which cells of higher order are drawn by their
+ * corners. A rank may have none of the polyhedra of a leaf, or no part of the data at all. Collective. */
+void agree_on_faces(const rank_info &w, std::vector<leaf_mesh> &leaves)
+{
+    int count = static_cast<int>(leaves.size());
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT, MPI_MAX, w.comm);
+    std::vector<unsigned char> has_faces(static_cast<size_t>(count));
+    for (size_t i = 0; i < leaves.size(); i++) has_faces[i] = leaves[i].has_faces;
+    MPI_Allreduce(MPI_IN_PLACE, has_faces.data(), count, MPI_UNSIGNED_CHAR, MPI_MAX, w.comm);
+    for (size_t i = 0; i < leaves.size(); i++) leaves[i].has_faces = has_faces[i] != 0;
+}
 
 /* Returns, on rank 0, the lines in the texts of all ranks that are not in `seen` yet. Collective. */
 std::vector<std::string> new_lines(const rank_info &w, const std::string &text, std::set<std::string> &seen)
@@ -237,12 +253,15 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
     const std::string name = source.name(index);
     bar.begin(index, name);
     step_source::result part;
+    std::vector<leaf_mesh> leaves;
     insitu_vtk_report report{};
     const auto start = std::chrono::steady_clock::now();
     run_on_all_ranks(w, [&] {
         part = source.read(index);
-        report = on.set(part.data);
+        leaves = list_leaf_meshes(part.data, mesh_name);
     });
+    agree_on_faces(w, leaves);
+    run_on_all_ranks(w, [&] { report = on.set(part.data, leaves); });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
     /* All ranks use rank 0's time, because some ranks may have read a part without a time. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);

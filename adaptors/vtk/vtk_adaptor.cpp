@@ -74,6 +74,7 @@ struct set_result {
 struct insitu_vtk_adaptor {
     insitu_session *session = nullptr;
     std::map<std::string, part_map> parts; // mesh parts, by the name given to insitu_vtk_set()
+    std::set<std::string> by_corners;      // meshes whose cells of higher order are drawn by their corners
     std::string error, copied_why, cells_why, warnings;
 };
 
@@ -186,7 +187,8 @@ void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string
 }
 
 /* Stores the mesh and the fields of grid in p. If there is nothing to draw, p.mesh.cell_count is 0. */
-void make_mesh_part(vtkUnstructuredGrid *grid, const std::string &name, set_result &out, mesh_part &p)
+void make_mesh_part(const insitu_vtk_adaptor *adaptor, vtkUnstructuredGrid *grid, const std::string &name,
+                    set_result &out, mesh_part &p)
 {
     const std::string what = "mesh '" + name + "'";
     insitu_mesh_defaults(&p.mesh);
@@ -194,7 +196,7 @@ void make_mesh_part(vtkUnstructuredGrid *grid, const std::string &name, set_resu
     cell_counts counts;
     conversion_log log;
     std::string error;
-    const cells_view view = {what, p.held, log, p.mesh, cells, counts};
+    const cells_view view = {what, p.held, log, p.mesh, cells, counts, adaptor->by_corners.count(name) > 0};
     if (!view_cells(grid, view, error)) throw failure{INSITU_ERROR_MESH, error};
     log_cells(counts, what, out.log);
     out.cells.split += counts.split;
@@ -271,7 +273,7 @@ void set_leaf(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
               set_result &out)
 {
     mesh_part new_part;
-    make_mesh_part(grid, name, out, new_part);
+    make_mesh_part(adaptor, grid, name, out, new_part);
     set_part(adaptor, parts, {name, whole_mesh}, std::move(new_part), out);
 }
 
@@ -499,6 +501,17 @@ insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkD
     const insitu_status status = catch_exceptions(adaptor, [&] { set_all(adaptor, name, data, out); });
     fill_report(adaptor, out, report);
     return status;
+}
+
+insitu_status insitu_vtk_draw_by_corners(insitu_vtk_adaptor *adaptor, const char *mesh, bool is_by_corners)
+{
+    if (!adaptor || !mesh) return INSITU_ERROR_ARGUMENT;
+    return catch_exceptions(adaptor, [&] {
+        if (is_by_corners)
+            adaptor->by_corners.insert(mesh);
+        else
+            adaptor->by_corners.erase(mesh);
+    });
 }
 
 const char *insitu_vtk_error(const insitu_vtk_adaptor *adaptor)

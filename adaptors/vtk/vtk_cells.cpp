@@ -9,6 +9,7 @@
  * linear cell. */
 #include "vtk_cells.h"
 
+#include "insitu/vtk_grids.h"
 #include "vtk_faces.h"
 
 #include <array>
@@ -152,15 +153,17 @@ template <typename Id> struct raw_cells {
     const Id *offsets;
     const Id *connectivity;
     int64_t count;
-    bool are_higher_known; /* true if cells of higher order are passed as they are. It is false if the grid also
-                              contains polyhedra or polygons, or Lagrange cells whose order differs between axes. */
+    bool are_higher_known;       /* true if cells of higher order are passed as they are. It is false if the grid also
+                                    contains polyhedra or polygons. */
+    std::vector<bool> is_uneven; /* whether the order of each cell differs between axes; empty if no cell's does */
 
     const cell_conversion &conversion_of(int64_t cell) const
     {
         const cell_conversion &higher = get_higher_order_conversion(types[cell]);
         const bool is_lagrange = types[cell] >= VTK_LAGRANGE_TRIANGLE && types[cell] <= VTK_LAGRANGE_PYRAMID;
+        const bool has_one_order = is_uneven.empty() || !is_uneven[static_cast<size_t>(cell)];
         if (higher.kind != conversion_kind::higher || !are_higher_known || size(cell) < higher.needed_points ||
-            (is_lagrange && !is_complete(types[cell], size(cell))))
+            (is_lagrange && !(has_one_order && is_complete(types[cell], size(cell)))))
             return cell_conversions()[types[cell]];
         return higher;
     }
@@ -343,16 +346,20 @@ bool excludes_higher_order(uint8_t type)
     return what == conversion_kind::polygon || what == conversion_kind::faces;
 }
 
-/* Returns whether each Lagrange cell has the same order along all axes. */
-bool has_equal_orders_on_axes(vtkUnstructuredGrid *grid)
+/* Returns for each cell whether its order differs between axes, or an empty list if no cell's does. */
+std::vector<bool> find_uneven_cells(vtkUnstructuredGrid *grid)
 {
+    std::vector<bool> is_uneven;
     vtkDataArray *degrees = grid->GetCellData()->GetHigherOrderDegrees();
-    bool is_even = true;
-    for (vtkIdType i = 0; degrees && degrees->GetNumberOfComponents() == 3 && i < degrees->GetNumberOfTuples(); i++) {
+    const vtkIdType count = grid->GetNumberOfCells();
+    if (!degrees || degrees->GetNumberOfComponents() != 3 || degrees->GetNumberOfTuples() != count) return is_uneven;
+    for (vtkIdType i = 0; i < count; i++) {
         const double *of = degrees->GetTuple3(i);
-        is_even = is_even && of[0] == of[1] && (of[2] == of[0] || of[2] == 0);
+        if (of[0] == of[1] && (of[2] == of[0] || of[2] == 0)) continue;
+        is_uneven.resize(static_cast<size_t>(count));
+        is_uneven[static_cast<size_t>(i)] = true;
     }
-    return is_even;
+    return is_uneven;
 }
 
 template <typename Array>
@@ -360,8 +367,12 @@ bool borrow_or_convert_cells(vtkUnstructuredGrid *grid, Array *offsets, Array *c
                              std::string &error)
 {
     using id = typename Array::ValueType;
-    raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0), connectivity->GetPointer(0),
-                         grid->GetNumberOfCells(), has_equal_orders_on_axes(grid)};
+    raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0),
+                         offsets->GetPointer(0),
+                         connectivity->GetPointer(0),
+                         grid->GetNumberOfCells(),
+                         !view.are_higher_by_corners,
+                         find_uneven_cells(grid)};
     const int64_t connectivity_count = connectivity->GetNumberOfValues();
     std::array<int64_t, 256> by_type{};
     bool are_read_directly = true;
@@ -418,3 +429,13 @@ void log_cells(const cell_counts &counts, const std::string &what, conversion_lo
 }
 
 } // namespace insitu_vtk
+
+bool insitu_vtk_has_faces(vtkUnstructuredGrid *grid)
+{
+    vtkUnsignedCharArray *types = grid->GetCellTypesArray();
+    const vtkIdType count = types ? types->GetNumberOfValues() : 0;
+    bool has_faces = false;
+    for (vtkIdType i = 0; i < count && !has_faces; i++)
+        has_faces = insitu_vtk::excludes_higher_order(types->GetValue(i));
+    return has_faces;
+}

@@ -37,6 +37,7 @@ struct cells_view {
     insitu_mesh &mesh;
     cell_list &cells;
     cell_counts &counts;
+    bool are_higher_by_corners; // true if cells of higher order are drawn by their corners in any case
 };
 
 /* Fills in the cells of the view's mesh (count, types, connectivity, offsets) from grid. The indices in the

@@ -123,4 +123,21 @@ vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, con
     return amr;
 }
 
+std::vector<leaf_mesh> list_leaf_meshes(vtkDataObject *data, const std::string &name)
+{
+    const auto has_faces = [](vtkDataObject *leaf) {
+        auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf);
+        return grid && insitu_vtk_has_faces(grid);
+    };
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    if (!data) return {};
+    if (!composite) return {{name, has_faces(data)}};
+    std::vector<leaf_mesh> leaves;
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    it->SkipEmptyNodesOff();
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+        leaves.push_back({name + "/" + std::to_string(leaves.size()), has_faces(it->GetCurrentDataObject())});
+    return leaves;
+}
+
 } // namespace render_tool

@@ -3,6 +3,7 @@
 #define GRIDS_OF_H
 
 #include <string>
+#include <vector>
 
 #include <vtkSmartPointer.h>
 
@@ -27,6 +28,16 @@ vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, con
 /* Returns "", or a description of the first cell that lies outside the connectivity or refers to a point that does not
  * exist. */
 std::string find_bad_cell(vtkUnstructuredGrid *grid);
+
+/* The mesh that a leaf of a data set becomes. */
+struct leaf_mesh {
+    std::string name;       // name that the VTK adaptor gives to the mesh if the leaf is not a structured block
+    bool has_faces = false; // true if the leaf has polygons, polyhedra or prisms (insitu_vtk_has_faces())
+};
+
+/* Lists the leaves of data, also the empty ones, in the order of VTK's iterator. `name` is the name of the mesh that a
+ * data set without leaves becomes. Returns an empty list if data is null. */
+std::vector<leaf_mesh> list_leaf_meshes(vtkDataObject *data, const std::string &name);
 
 } // namespace render_tool
 

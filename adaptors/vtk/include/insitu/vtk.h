@@ -38,8 +38,8 @@
  * Quadratic and Lagrange cells are borrowed, and are drawn as linear cells between their points. For cells of the types
  * 33, 34 and 37, the first 20, 6 and 14 points are copied. Bezier cells, cells whose order differs between axes, and
  * all cells of higher order in grids with polygons or polyhedra are copied, drawn as linear cells with the same
- * corners, and reported. All other cells are reported and not drawn, including polyhedra without faces, lines and
- * points.
+ * corners, and reported. insitu_vtk_draw_by_corners() is for grids that have polygons or polyhedra on other ranks. All
+ * other cells are reported and not drawn, including polyhedra without faces, lines and points.
  *
  * Of polygonal data the points are borrowed, and the polygons too if there are no lines, points or strips.
  *
@@ -98,6 +98,14 @@ INSITU_API insitu_status insitu_vtk_create(insitu_session *session, insitu_vtk_a
  * insitu_set_field(). */
 INSITU_API insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
                                         insitu_vtk_report *report);
+
+/* Chooses whether later calls of insitu_vtk_set() draw all cells of higher order of a mesh by their corners, even if
+ * its grid on this rank has no polygons and polyhedra. `mesh` is the name of a whole mesh, such as "domain", or that of
+ * a leaf of a composite, such as "domain/3". A grid whose cells are distributed over ranks is drawn the same on any
+ * number of ranks only if all ranks choose this as soon as one rank's part has polygons or polyhedra. Local.
+ *
+ * Returns INSITU_ERROR_ARGUMENT if adaptor or mesh is NULL. */
+INSITU_API insitu_status insitu_vtk_draw_by_corners(insitu_vtk_adaptor *adaptor, const char *mesh, bool is_by_corners);
 
 /* Returns the message of the last call that failed on this adaptor, or "" if none did. Valid until the next call.
  * Local. */

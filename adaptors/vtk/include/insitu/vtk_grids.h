@@ -1,5 +1,5 @@
 /* Converts any VTK data set to an unstructured grid, which insitu-render needs to distribute cells to ranks, and reads
- * ghost flags. insitu_vtk_set() does not need this conversion for structured data sets. */
+ * ghost flags and types of cells. insitu_vtk_set() does not need this conversion for structured data sets. */
 #ifndef INSITU_VTK_GRIDS_H
 #define INSITU_VTK_GRIDS_H
 
@@ -29,6 +29,10 @@ INSITU_API vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data);
  * `count` values. The caller must release the array by UnRegister(). data does not change. May throw std::bad_alloc.
  * Local. */
 INSITU_API vtkUnsignedCharArray *insitu_vtk_ghost_flags(vtkDataSetAttributes *data, int64_t count);
+
+/* Returns whether grid has polygons, polyhedra, or prisms of five or six sides. insitu_vtk_set() draws cells of higher
+ * order by their corners if they are in one grid with such cells. Local. */
+INSITU_API bool insitu_vtk_has_faces(vtkUnstructuredGrid *grid);
 
 } // extern "C"
 
