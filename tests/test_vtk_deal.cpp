@@ -127,6 +127,29 @@ void composite_is_distributed_each_cell_once(void **)
     expect_each_cell_once(blocks);
 }
 
+/* Checks that each rank's part has the attributes of the grid: VTK marks the array of the degrees of Lagrange cells as
+ * an attribute, and the array may be another attribute too. */
+void parts_keep_the_attributes_of_the_grid(void **)
+{
+    const auto grid = make_lattice(2, 0, 0);
+    vtkNew<vtkDoubleArray> degrees;
+    degrees->SetName("degrees");
+    degrees->SetNumberOfComponents(3);
+    for (int i = 0; i < 8; i++) degrees->InsertNextTuple3(1, 7, i);
+    grid->GetCellData()->SetVectors(degrees);
+    grid->GetCellData()->SetHigherOrderDegrees(degrees);
+    grid->GetPointData()->SetActiveScalars("x");
+    for (const int rank : {0, 1}) {
+        const auto distributed = distribute_cells(grid, partition::block, rank, 2);
+        auto *part = vtkUnstructuredGrid::SafeDownCast(distributed);
+        vtkDataArray *kept = part->GetCellData()->GetHigherOrderDegrees();
+        assert_non_null(kept);
+        assert_ptr_equal(part->GetCellData()->GetVectors(), kept);
+        for (int i = 0; i < 4; i++) assert_true(kept->GetComponent(i, 2) == 4 * rank + i);
+        assert_ptr_equal(part->GetPointData()->GetScalars(), part->GetPointData()->GetArray("x"));
+    }
+}
+
 void more_ranks_than_cells_leaves_some_without(void **)
 {
     const auto grid = make_lattice(1, 0, 0);
@@ -177,6 +200,7 @@ int main()
     const CMUnitTest tests[] = {
         cmocka_unit_test(grid_is_distributed_each_cell_once),
         cmocka_unit_test(composite_is_distributed_each_cell_once),
+        cmocka_unit_test(parts_keep_the_attributes_of_the_grid),
         cmocka_unit_test(more_ranks_than_cells_leaves_some_without),
         cmocka_unit_test(parts_are_balanced),
         cmocka_unit_test(leaves_keep_their_numbers_on_all_ranks),

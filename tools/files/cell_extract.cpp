@@ -92,7 +92,8 @@ class face_streams
     }
 };
 
-/* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. */
+/* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. A copy is the same
+ * attributes (scalars, degrees of cells of higher order, ...) as its array. */
 void extract_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
 {
     for (int i = 0; i < from->GetNumberOfArrays(); i++) {
@@ -103,7 +104,9 @@ void extract_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *pick
         part->SetNumberOfComponents(array->GetNumberOfComponents());
         part->SetNumberOfTuples(picked->GetNumberOfIds());
         array->GetTuples(picked, part);
-        to->AddArray(part);
+        const int index = to->AddArray(part);
+        for (int type = 0; type < vtkDataSetAttributes::NUM_ATTRIBUTES; type++)
+            if (from->GetAbstractAttribute(type) == array) to->SetActiveAttribute(index, type);
     }
 }
 
