@@ -464,6 +464,60 @@ void wrong_series_are_refused_with_the_reason(void **)
                    "none.vtu: No such file");
 }
 
+/* Returns a .vtu file whose pieces are one tet each, with these elements of point and cell data. */
+std::string make_file_of_pieces(const std::vector<std::string> &pieces)
+{
+    std::string text = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>\n";
+    for (const std::string &fields : pieces)
+        text += "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\">" + fields +
+                "<Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1"
+                "</DataArray></Points><Cells>"
+                "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
+                "<DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">4</DataArray>"
+                "<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray></Cells></Piece>\n";
+    return text + "</UnstructuredGrid></VTKFile>\n";
+}
+
+/* Checks files with several pieces, whose arrays VTK's reader matches by their positions in the first piece. */
+void pieces_of_one_file_with_different_fields_are_refused(void **)
+{
+    const auto array = [](const std::string &name, const std::string &type, const std::string &values,
+                          const std::string &more = "") {
+        return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" " + more + "format=\"ascii\">" + values +
+               "</DataArray>";
+    };
+    const auto points = [](const std::string &arrays) { return "<PointData>" + arrays + "</PointData>"; };
+    const auto cells = [](const std::string &arrays) { return "<CellData>" + arrays + "</CellData>"; };
+    const std::string f = array("f", "Float64", "1 2 3 4"), g = array("g", "Float64", "5 6 7 8"),
+                      c = array("c", "Float64", "9"), both = "two.vtu: the point data of piece 2 of 2 are ",
+                      first = ", expected those of piece 1: f (Float64), g (Float64)",
+                      of_cells = "two.vtu: the cell data of piece 2 of 2 are ";
+    expect_refusal("two.vtu", make_file_of_pieces({points(f + g), points(f)}), both + "f (Float64)" + first);
+    expect_refusal("two.vtu", make_file_of_pieces({points(f + g), ""}), both + "none" + first);
+    expect_refusal("two.vtu", make_file_of_pieces({points(f + g), points(g + f)}),
+                   both + "g (Float64), f (Float64)" + first);
+    expect_refusal("two.vtu", make_file_of_pieces({points(f), points(f + g)}),
+                   both + "f (Float64), g (Float64), expected those of piece 1: f (Float64)");
+    expect_refusal("two.vtu", make_file_of_pieces({points(f), points(array("f", "Int32", "1 2 3 4"))}),
+                   both + "f (Int32), expected those of piece 1: f (Float64)");
+    expect_refusal("two.vtu",
+                   make_file_of_pieces({cells(c), cells(array("c", "Float64", "1 2", "NumberOfComponents=\"2\" "))}),
+                   of_cells + "c (Float64, 2 components), expected those of piece 1: c (Float64)");
+    write_file(folder + "/two.vtm", "<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>"
+                                    "<DataSet index=\"0\" file=\"two.vtu\"/></vtkMultiBlockDataSet></VTKFile>\n");
+    expect_reported(get_refusal("two.vtm"), of_cells);
+
+    std::string with_empty = make_file_of_pieces({points(f + g) + cells(c), points(f + g) + cells(c)});
+    with_empty.insert(with_empty.find("</Piece>") + 8,
+                      "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"><Points/><Cells>"
+                      "<DataArray type=\"Int32\" Name=\"connectivity\"/><DataArray type=\"Int32\" Name=\"offsets\"/>"
+                      "<DataArray type=\"UInt8\" Name=\"types\"/></Cells></Piece>");
+    write_file(folder + "/two.vtu", with_empty);
+    const auto grid = read_grid("two.vtu");
+    assert_int_equal(grid->GetNumberOfCells(), 2);
+    for (int i = 0; i < 8; i++) assert_true(grid->GetPointData()->GetArray("g")->GetComponent(i, 0) == 5 + i % 4);
+}
+
 /* Checks files of grids without cells, as written by VTK and by other programs. */
 void grids_without_cells_are_accepted(void **)
 {
@@ -669,6 +723,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(truncated_foam_files_give_errors_or_the_same_grid),
         cmocka_unit_test(series_have_the_times_of_their_entries),
         cmocka_unit_test(wrong_series_are_refused_with_the_reason),
+        cmocka_unit_test(pieces_of_one_file_with_different_fields_are_refused),
         cmocka_unit_test(grids_without_cells_are_accepted),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
         cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),

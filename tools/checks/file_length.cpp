@@ -78,7 +78,7 @@ void check_length(const std::string &path)
                                  std::to_string(expected));
     if (is_vtk_xml(path)) {
         check_last_tag(path);
-        check_xml_numbers(path);
+        check_xml_tags(path);
     }
     if (has_ending(path, ".vtk")) check_legacy(path);
     if (has_ending(path, ".case")) {

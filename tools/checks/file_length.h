@@ -7,8 +7,8 @@
 namespace render_tool
 {
 
-/* Throws std::runtime_error if the file is shorter than it declares, ends in the middle of a line of text, or contains
- * a word that is not a number among its numbers. */
+/* Throws std::runtime_error if the file is shorter than it declares, ends in the middle of a line of text, contains a
+ * word that is not a number among its numbers, or consists of pieces with different fields. */
 void check_length(const std::string &path);
 
 /* Checks whether a .vtu file is complete and declares that none of its pieces has points or cells. */

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "piece_check.h"
+
 namespace render_tool
 {
 
@@ -81,23 +83,26 @@ void refuse_number(const std::string &path, const std::string &word, int64_t off
     throw std::runtime_error(path + ": line " + std::to_string(line) + ": \"" + word.substr(0, 60) + "\" is no number");
 }
 
-void check_xml_numbers(const std::string &path)
+void check_xml_tags(const std::string &path)
 {
     std::ifstream in(path, std::ios::binary);
     std::streambuf *bytes = in.rdbuf();
     int64_t offset = 0;
     const int end = std::char_traits<char>::eof();
     std::string tag;
+    piece_check pieces;
     for (int c = bytes->sbumpc(); c != end; c = bytes->sbumpc()) {
         offset++;
         if (c != '<') continue;
         tag.clear();
         for (c = bytes->sbumpc(); c != end && c != '>'; c = bytes->sbumpc()) tag += static_cast<char>(c);
         offset += static_cast<int64_t>(tag.size()) + 1;
-        if (c == end || tag.compare(0, 12, "AppendedData") == 0) return;
+        if (c == end || tag.compare(0, 12, "AppendedData") == 0) break;
         std::replace_if(tag.begin(), tag.end(), is_blank, ' ');
+        if (!tag.empty()) pieces.add_tag(tag);
         if (has_text_values(tag)) check_words(path, bytes, offset);
     }
+    pieces.check(path);
 }
 
 } // namespace render_tool

@@ -16,8 +16,8 @@ bool is_number(const std::string &word);
 [[noreturn]] void refuse_number(const std::string &path, const std::string &word, int64_t offset);
 
 /* Throws std::runtime_error, as refuse_number() does, if a data array of a VTK XML file contains a word that is not a
- * number. */
-void check_xml_numbers(const std::string &path);
+ * number. Throws too if the pieces in the file have different fields (piece_check.h). */
+void check_xml_tags(const std::string &path);
 
 } // namespace render_tool
 
