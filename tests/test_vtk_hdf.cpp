@@ -11,6 +11,7 @@
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
+#include <vtkFieldData.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnstructuredGrid.h>
@@ -194,6 +195,26 @@ void parts_of_one_step_are_all_read(void **)
     assert_true(found.find("3 cells x 2..5 z 0..1 f 2..5 c 2..4; ") != std::string::npos);
 }
 
+/* Checks that the field data of a file without steps state its time, for one part and for two. */
+void time_of_a_file_without_steps_is_in_its_field_data(void **)
+{
+    for (const int parts : {1, 2}) {
+        {
+            writer w("time.vtkhdf", "UnstructuredGrid");
+            lists all;
+            for (int i = 0; i < parts; i++) add_part(all, 2 * i, 2, 0, 0);
+            w.write_dataset(all);
+            w.create_group("/VTKHDF/FieldData");
+            w.write_dataset("FieldData/TimeValue", std::vector<double>{2.5});
+        }
+        for (int piece = 0; piece < parts; piece++) {
+            const auto data = open_data_file(folder + "/time.vtkhdf")->read(0, piece, parts);
+            vtkDataArray *time = data->GetFieldData()->GetArray("TimeValue");
+            assert_true(time && time->GetComponent(0, 0) == 2.5);
+        }
+    }
+}
+
 /* Checks steps in which everything changes, including the number of parts. The second step begins with a part without
  * cells. */
 void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
@@ -344,6 +365,7 @@ int main()
 {
     const CMUnitTest tests[] = {
         cmocka_unit_test(parts_of_one_step_are_all_read),
+        cmocka_unit_test(time_of_a_file_without_steps_is_in_its_field_data),
         cmocka_unit_test(steps_of_a_mesh_that_changes_are_read_one_by_one),
         cmocka_unit_test(steps_of_values_share_their_mesh),
         cmocka_unit_test(points_that_move_keep_their_cells),

@@ -522,6 +522,44 @@ void higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks(void **
     }
 }
 
+vtkSmartPointer<vtkUnstructuredGrid> make_row_at_time(double time, int count, int first = 0)
+{
+    auto row = make_row_of_tets(count, first);
+    vtkNew<vtkDoubleArray> value;
+    value->SetName("TimeValue");
+    value->InsertNextValue(time);
+    row->GetFieldData()->AddArray(value);
+    return row;
+}
+
+/* Checks that the time is that of the first piece or block that has one, on any number of ranks. */
+void time_is_read_from_any_piece(void **)
+{
+    write_vtu("time_0.vtu", make_row_at_time(2.5, 3));
+    write_vtu("time_1.vtu", make_row_at_time(2.5, 2, 3));
+    write_vtu("time_2.vtu", make_row_at_time(2.5, 0));
+    const std::string head = "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid>",
+                      tail = "</PUnstructuredGrid></VTKFile>\n";
+    write_file(make_path("time_a.pvtu"), head + "<Piece Source=\"time_2.vtu\"/><Piece Source=\"time_0.vtu\"/>" +
+                                             "<Piece Source=\"row_10.vtu\"/>" + tail);
+    write_file(make_path("time_b.pvtu"), head + "<Piece Source=\"empty.vtu\"/><Piece Source=\"row_2.vtu\"/>" +
+                                             "<Piece Source=\"time_1.vtu\"/>" + tail);
+    write_file(make_path("time.pvd"), "<VTKFile type=\"Collection\"><Collection><DataSet file=\"row_2.vtu\"/>"
+                                      "<DataSet file=\"time_1.vtu\"/></Collection></VTKFile>\n");
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, make_row_of_tets(3));
+    blocks->SetBlock(1, make_row_at_time(2.5, 2, 3));
+    vtkNew<vtkXMLMultiBlockDataWriter> writer;
+    writer->SetFileName(make_path("time.vtm").c_str());
+    writer->SetInputData(blocks);
+    assert_int_equal(writer->Write(), 1);
+    for (const int ranks : {1, 2, 3})
+        for (const char *files :
+             {"time_0.vtu", "time_a.pvtu", "time_b.pvtu", "time.pvd", "time.vtm", "--pieces row_2.vtu time_1.vtu"})
+            expect_result(run_ranks(ranks, std::string("scene.yaml ") + files), 0, "cycle 0  time 2.5  ");
+    expect_result(run_ranks(3, "--steps 1 scene.yaml row_2.vtu row_10.vtu"), 0, "cycle 1  time 1  ");
+}
+
 /* Checks that no cell is missing for each method of reading and distributing cells. */
 void every_distribution_mode_reads_all_cells(void **)
 {
@@ -562,6 +600,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks),
+        cmocka_unit_test(time_is_read_from_any_piece),
         cmocka_unit_test(every_distribution_mode_reads_all_cells),
     };
     return cmocka_run_group_tests(tests, make_files, nullptr);

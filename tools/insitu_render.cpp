@@ -8,6 +8,7 @@
 #include <climits>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -208,6 +209,17 @@ std::string check_cells(const rank_info &w, const insitu_vtk_report &report, con
     throw std::runtime_error(why);
 }
 
+/* Returns the time of the lowest rank that has one, because some ranks may have read a part without a time. If no rank
+ * has a time, returns the cycle. Collective. */
+double agree_on_time(const rank_info &w, const std::optional<double> &of_part, int64_t cycle)
+{
+    int rank = of_part ? w.rank : w.ranks;
+    MPI_Allreduce(MPI_IN_PLACE, &rank, 1, MPI_INT, MPI_MIN, w.comm);
+    double time = of_part.value_or(static_cast<double>(cycle));
+    if (rank < w.ranks) MPI_Bcast(&time, 1, MPI_DOUBLE, rank, w.comm);
+    return time;
+}
+
 std::string milliseconds(double ms)
 {
     char text[32];
@@ -263,10 +275,9 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
     agree_on_faces(w, leaves);
     run_on_all_ranks(w, [&] { report = on.set(part.data, leaves); });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
-    /* All ranks use rank 0's time, because some ranks may have read a part without a time. */
-    MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
+    const double time = agree_on_time(w, part.time, source.cycle(index));
     std::string warnings = part.warnings + check_cells(w, report, name) + report.warnings + "\n", missing;
-    const insitu_report &done = on.step(source.cycle(index), part.time, missing);
+    const insitu_report &done = on.step(source.cycle(index), time, missing);
     if (missing.empty()) {
         run.complete_steps++;
     } else {
@@ -275,7 +286,7 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
     }
     if (done.warnings) warnings += done.warnings;
     run.images += done.images;
-    bar.line(format_step_line(w, done, name, part.time, read_time.count()));
+    bar.line(format_step_line(w, done, name, time, read_time.count()));
     show_warnings(w, warnings, run, bar);
 }
 

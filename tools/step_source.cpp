@@ -35,6 +35,13 @@ std::string make_next_file_warning(const std::string &file, const std::vector<st
     return file + ": the run goes on in " + file_name(next) + ", which is not given\n";
 }
 
+/* Returns the time of a step: that of the file's list of steps, or else the one that the data state, if any. */
+std::optional<double> find_time(const data_file &file, size_t step, vtkDataObject *data)
+{
+    if (step < file.times().size()) return file.times()[step];
+    return find_time_of_data(data);
+}
+
 } // namespace
 
 step_source::step_source(const options &o, int rank, int ranks) : options_(o), rank_(rank), ranks_(ranks)
@@ -79,38 +86,40 @@ bool step_source::keeps_whole_files() const
     return options_.how == partition::block && static_cast<int>(options_.files.size()) >= ranks_;
 }
 
-vtkSmartPointer<vtkDataObject> step_source::read_pieces(std::string &warnings)
+step_source::result step_source::read_pieces()
 {
+    result r;
     const auto files = static_cast<int64_t>(options_.files.size());
     auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
     all->SetNumberOfBlocks(static_cast<unsigned>(files));
     for (int64_t f = 0; f < files; f++) {
         if (keeps_whole_files() && f * ranks_ / files != rank_) continue;
         const auto file = static_cast<size_t>(f);
-        all->SetBlock(static_cast<unsigned>(f),
-                      convert_to_drawable_data(open(file).read(0, 0, 1), options_.files[file]));
-        warnings += open(file).take_warnings();
+        const auto data = open(file).read(0, 0, 1);
+        if (!r.time) r.time = find_time(open(file), 0, data);
+        all->SetBlock(static_cast<unsigned>(f), convert_to_drawable_data(data, options_.files[file]));
+        r.warnings += open(file).take_warnings();
     }
-    if (keeps_whole_files()) return all;
-    return distribute_cells(all, options_.how, rank_, ranks_);
+    r.data = all;
+    if (!keeps_whole_files()) r.data = distribute_cells(all, options_.how, rank_, ranks_);
+    return r;
 }
 
 step_source::result step_source::read(size_t index)
 {
     const step &s = steps_[index];
-    const auto fallback = static_cast<double>(s.cycle);
+    const std::string earlier_warnings = std::exchange(warnings_, "");
     result r;
-    r.warnings = std::exchange(warnings_, "");
     if (options_.pieces) {
-        r.data = read_pieces(r.warnings);
-        r.time = fallback;
+        r = read_pieces();
+        r.warnings = earlier_warnings + r.warnings;
         return r;
     }
     data_file &file = open(s.file);
     const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces(s.inside) >= ranks_;
     const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
-    r.warnings += file.take_warnings();
-    r.time = s.inside < file.times().size() ? file.times()[s.inside] : get_time_of_data(data, fallback);
+    r.warnings = earlier_warnings + file.take_warnings();
+    r.time = find_time(file, s.inside, data);
     if (!data) return r;
     const auto drawable = convert_to_drawable_data(data, file.step_path(s.inside));
     r.data = is_by_pieces ? drawable : distribute_cells(drawable, options_.how, rank_, ranks_);

@@ -3,6 +3,7 @@
 #define STEP_SOURCE_H
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,8 @@ class step_source
 
     struct result {
         vtkSmartPointer<vtkDataObject> data; /* this rank's part of the step; null if the rank has no part */
-        double time = 0;
-        std::string warnings; // warnings about the step, one per line
+        std::optional<double> time;          // none if this rank's part states no time
+        std::string warnings;                // warnings about the step, one per line
     };
     result read(size_t step); /* reads a step; throws std::runtime_error */
 
@@ -45,7 +46,7 @@ class step_source
     };
     void add_steps_of(size_t file, int64_t &cycle);
     data_file &open(size_t file);
-    vtkSmartPointer<vtkDataObject> read_pieces(std::string &warnings);
+    result read_pieces();
     bool keeps_whole_files() const;
 
     options options_;

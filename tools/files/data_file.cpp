@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include <vtkAlgorithm.h>
+#include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -211,11 +212,18 @@ std::unique_ptr<data_file> open_by_vtk(const std::string &path)
     return std::make_unique<vtk_file>(path, *kind_of(path));
 }
 
-double get_time_of_data(vtkDataObject *data, double fallback)
+std::optional<double> find_time_of_data(vtkDataObject *data)
 {
     vtkFieldData *fields = data ? data->GetFieldData() : nullptr;
-    vtkDataArray *time = fields ? fields->GetArray("TimeValue") : nullptr;
-    return time && time->GetNumberOfTuples() > 0 ? time->GetComponent(0, 0) : fallback;
+    vtkDataArray *array = fields ? fields->GetArray("TimeValue") : nullptr;
+    if (array && array->GetNumberOfTuples() > 0) return array->GetComponent(0, 0);
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    if (!composite) return std::nullopt;
+    std::optional<double> time;
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !time && !it->IsDoneWithTraversal(); it->GoToNextItem())
+        time = find_time_of_data(it->GetCurrentDataObject());
+    return time;
 }
 
 } // namespace render_tool

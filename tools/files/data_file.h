@@ -3,6 +3,7 @@
 #define DATA_FILE_H
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -66,8 +67,8 @@ std::unique_ptr<data_file> open_data_file(const std::string &path);
  * need not exist. Throws as data_file::read() does. */
 std::unique_ptr<data_file> open_by_vtk(const std::string &path);
 
-/* Returns the time in the field data TimeValue of a data set, or fallback if it has none. */
-double get_time_of_data(vtkDataObject *data, double fallback);
+/* Returns the time in the field data TimeValue of a data set or, if it has none, of its first leaf that has one. */
+std::optional<double> find_time_of_data(vtkDataObject *data);
 
 } // namespace render_tool
 

@@ -5,6 +5,7 @@
  *       NumberOfPoints, NumberOfCells, NumberOfConnectivityIds    one entry per part
  *       Points, Types, Connectivity, Offsets (number of cells + 1 per part)
  *       PointData/NAME, CellData/NAME
+ *       FieldData/TimeValue       time of a file without steps
  *       Steps                     attribute NSteps; each of the following has one entry per step
  *         Values                  times
  *         PartOffsets, NumberOfParts
@@ -25,6 +26,7 @@
 #include <vtkCellData.h>
 #include <vtkCellType.h>
 #include <vtkDataArray.h>
+#include <vtkFieldData.h>
 #include <vtkIdTypeArray.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
@@ -247,7 +249,10 @@ class hdf_grids : public data_file
             const bool belongs_to_piece = i * pieces / count == piece;
             if (belongs_to_piece) {
                 auto grid = read_part(at, first, step);
-                if (count == 1) return grid;
+                if (count == 1) {
+                    add_time(grid);
+                    return grid;
+                }
                 all->SetBlock(static_cast<unsigned>(i), grid);
             }
             at = {at.part + 1,
@@ -259,6 +264,7 @@ class hdf_grids : public data_file
                   0,
                   0};
         }
+        add_time(all);
         return all;
     }
 
@@ -284,6 +290,17 @@ class hdf_grids : public data_file
             in_.fail("step " + std::to_string(step) + " has " + std::to_string(count) + " parts, of " +
                      std::to_string(all));
         return count;
+    }
+
+    /* Adds the file's field data TimeValue to data. In a file with steps, times() has their times instead. */
+    void add_time(vtkDataObject *data) const
+    {
+        const std::string name = "/VTKHDF/FieldData/TimeValue";
+        if (has_steps_ || !in_.has(name) || in_.length(name) == 0) return;
+        const array_pointer time = in_.rows(name, 0, 1, VTK_DOUBLE);
+        if (!time) return;
+        time->SetName("TimeValue");
+        data->GetFieldData()->AddArray(time);
     }
 
     part_position find_first_part(size_t step) const

@@ -17,6 +17,7 @@
 
 #include <vtkAppendFilter.h>
 #include <vtkCellData.h>
+#include <vtkFieldData.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkUnsignedCharArray.h>
@@ -143,17 +144,20 @@ class pvtu_file : public data_file
     vtkSmartPointer<vtkDataObject> read(size_t, int piece, int pieces) override
     {
         grid_list grids;
+        vtkSmartPointer<vtkFieldData> with_time;
         for (size_t i = 0; i < pieces_.size(); i++) {
             if (!is_file_of_piece(i, pieces_.size(), piece, pieces)) continue;
             const auto data = grids_of(open_data_file(pieces_[i])->read(0, 0, 1), pieces_[i]);
             auto *grid = vtkUnstructuredGrid::SafeDownCast(data);
             if (!grid) refuse(path_, pieces_[i] + " is no unstructured grid");
+            if (!with_time && find_time_of_data(grid)) with_time = grid->GetFieldData();
             if (grid->GetNumberOfCells() == 0) continue;
             make_fields_as_declared(grid, fields_, pieces_[i], warnings());
             grids.emplace_back(grid);
         }
         vtkSmartPointer<vtkDataObject> all = append(grids);
         throw_pending_message(path_);
+        if (with_time) all->GetFieldData()->AddArray(with_time->GetArray("TimeValue"));
         return all;
     }
 
