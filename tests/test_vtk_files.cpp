@@ -518,6 +518,26 @@ void pieces_of_one_file_with_different_fields_are_refused(void **)
     for (int i = 0; i < 8; i++) assert_true(grid->GetPointData()->GetArray("g")->GetComponent(i, 0) == 5 + i % 4);
 }
 
+/* Checks that arrays of colours are read beside other arrays. VTK stores their values as bytes. */
+void colours_of_legacy_files_are_fields(void **)
+{
+    const std::string head = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
+                             "0 0 0 1 0 0\n0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\n",
+                      scalars = "SCALARS f double\nLOOKUP_TABLE default\n1 2 3 4\n",
+                      colours = "COLOR_SCALARS rgb 3\n0 0 0 1 0 0\n0 1 0 0 0 1\nCOLOR_SCALARS grey 1\n0 0.2 0.4 1\n";
+    for (const std::string &fields : {scalars + colours, colours + scalars}) {
+        write_file(folder + "/colours.vtk", head + fields);
+        const auto grid = read_grid("colours.vtk");
+        vtkDataArray *f = grid->GetPointData()->GetArray("f"), *rgb = grid->GetPointData()->GetArray("rgb"),
+                     *grey = grid->GetPointData()->GetArray("grey");
+        assert_true(f && rgb && grey);
+        assert_true(f->GetComponent(3, 0) == 4);
+        assert_int_equal(rgb->GetNumberOfComponents(), 3);
+        assert_true(rgb->GetComponent(3, 2) == 255 && rgb->GetComponent(3, 0) == 0);
+        assert_true(grey->GetComponent(1, 0) == 51);
+    }
+}
+
 /* Checks files of grids without cells, as written by VTK and by other programs. */
 void grids_without_cells_are_accepted(void **)
 {
@@ -724,6 +744,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(series_have_the_times_of_their_entries),
         cmocka_unit_test(wrong_series_are_refused_with_the_reason),
         cmocka_unit_test(pieces_of_one_file_with_different_fields_are_refused),
+        cmocka_unit_test(colours_of_legacy_files_are_fields),
         cmocka_unit_test(grids_without_cells_are_accepted),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
         cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),

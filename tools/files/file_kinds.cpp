@@ -53,6 +53,7 @@ reader make_legacy_reader(const std::string &path)
     auto r = vtkSmartPointer<vtkGenericDataObjectReader>::New();
     r->SetFileName(path.c_str());
     r->ReadAllScalarsOn();
+    r->ReadAllColorScalarsOn();
     r->ReadAllVectorsOn();
     r->ReadAllTensorsOn();
     r->ReadAllNormalsOn();
