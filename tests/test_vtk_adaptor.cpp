@@ -861,6 +861,30 @@ void structured_leaves_with_the_same_fields_are_blocks_of_one_mesh(void **)
     assert_int_equal(f.session.meshes.count("m"), 1);
 }
 
+/* Checks leaves whose fields have the same name but another centring or another number of components: they cannot be
+ * blocks of one mesh. */
+void structured_leaves_with_other_fields_of_a_name_are_other_meshes(void **)
+{
+    const auto of_cells = make_image({}), of_vectors = make_image({});
+    vtkNew<vtkDoubleArray> cells, vectors;
+    cells->SetName("a");
+    cells->SetNumberOfTuples(of_cells->GetNumberOfCells());
+    of_cells->GetCellData()->AddArray(cells);
+    vectors->SetName("a");
+    vectors->SetNumberOfComponents(3);
+    vectors->SetNumberOfTuples(of_vectors->GetNumberOfPoints());
+    of_vectors->GetPointData()->AddArray(vectors);
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, make_image({"a"}));
+    blocks->SetBlock(1, of_cells);
+    blocks->SetBlock(2, of_vectors);
+    fixture f;
+    assert_int_equal(f.set(blocks), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 3);
+    for (const char *name : {"m/blocks of a[0]", "m/blocks of a (cells)[1]", "m/blocks of a (3 components)[2]"})
+        assert_int_equal(f.session.meshes.count(name), 1);
+}
+
 void arrays_outlive_the_data_set(void **)
 {
     fixture f;
@@ -987,6 +1011,7 @@ int main()
         cmocka_unit_test(polygons_are_shells),
         cmocka_unit_test(leaves_of_composites_are_meshes_until_removed),
         cmocka_unit_test(structured_leaves_with_the_same_fields_are_blocks_of_one_mesh),
+        cmocka_unit_test(structured_leaves_with_other_fields_of_a_name_are_other_meshes),
         cmocka_unit_test(arrays_outlive_the_data_set),
         cmocka_unit_test(one_name_at_points_and_cells_warns),
         cmocka_unit_test(malformed_data_is_refused),

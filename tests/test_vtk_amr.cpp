@@ -257,9 +257,9 @@ void levels_that_do_not_overlap_are_drawn_whole(void **)
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
     assert_int_equal(f.report.meshes, 2);
-    assert_null(f.session.meshes.at("m/blocks of f[0]").mesh.ghosts.data);
-    assert_int_equal(f.session.meshes.at("m/blocks of f[1]").mesh.lattice->refinement[0], 0);
-    assert_true(static_cast<const uint8_t *>(f.session.meshes.at("m/blocks of f[1]").mesh.ghosts.data)[5] != 0);
+    assert_null(f.session.meshes.at("m/blocks of f (cells)[0]").mesh.ghosts.data);
+    assert_int_equal(f.session.meshes.at("m/blocks of f (cells)[1]").mesh.lattice->refinement[0], 0);
+    assert_true(static_cast<const uint8_t *>(f.session.meshes.at("m/blocks of f (cells)[1]").mesh.ghosts.data)[5] != 0);
 }
 
 } // namespace

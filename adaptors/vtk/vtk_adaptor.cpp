@@ -308,13 +308,23 @@ void set_converted_grid(insitu_vtk_adaptor *adaptor, part_map &parts, const std:
     set_leaf(adaptor, parts, name, grid, out);
 }
 
+/* Returns the name of a field, with its centring and number of components unless it has one component at points. */
+std::string describe_field(const insitu_field &field)
+{
+    const bool is_of_cells = field.centring == INSITU_CELL;
+    const std::string count = std::to_string(field.component_count) + " components";
+    if (field.component_count == 1) return field.name + std::string(is_of_cells ? " (cells)" : "");
+    return field.name + (is_of_cells ? " (cells, " + count + ")" : " (" + count + ")");
+}
+
 /* Returns the name of the mesh of which this structured leaf becomes a block. Leaves with the same fields and the same
- * number of dimensions get the same name, because all blocks of a mesh must have the same fields. The name depends only
- * on this leaf, because the other leaves may be on other ranks. */
+ * number of dimensions get the same name, because all blocks of a mesh must have the same fields, with the same
+ * centring and number of components. The name depends only on this leaf, because the other leaves may be on other
+ * ranks. */
 std::string make_name_of_blocks(const std::string &name, const mesh_part &p)
 {
     std::set<std::string> fields;
-    for (const insitu_field &field : p.fields) fields.insert(field.name);
+    for (const insitu_field &field : p.fields) fields.insert(describe_field(field));
     std::string list;
     for (const std::string &field : fields) list += (list.empty() ? " of " : ", ") + field;
     if (list.size() > longest_list)

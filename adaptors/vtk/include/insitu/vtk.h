@@ -17,13 +17,15 @@
  * The leaves of a composite are numbered in the order of VTK's iterator, including empty leaves. Images, rectilinear
  * and curvilinear grids become blocks of one mesh (insitu_set_block), so that there is no seam between them. In
  * overlapping AMR this mesh is called "name". In other composites, structured leaves with the fields a and b become
- * blocks of the mesh "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other
+ * blocks of the mesh "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. A field of
+ * cells or of several components has this after its name, as in "name/blocks of p (cells), u (3 components)". All other
  * leaves become the meshes "name/0", "name/1", ....
  *
- * The names contain the fields because all blocks of a mesh must have the same fields on all ranks, and one rank does
- * not know the fields of the other ranks' blocks. Scenes hardly need them: `mesh: name` stands for all leaves, and a
- * layer without mesh is drawn on the leaves that have its field. A layer cannot be drawn on one block of a mesh. To
- * draw a structured leaf alone, set it by a separate call, under a different name.
+ * The names contain the fields because all blocks of a mesh must have the same fields on all ranks, with the same
+ * centring and number of components, and one rank does not know the fields of the other ranks' blocks. Scenes hardly
+ * need them: `mesh: name` stands for all leaves, and a layer without mesh is drawn on the leaves that have its field. A
+ * layer cannot be drawn on one block of a mesh. To draw a structured leaf alone, set it by a separate call, under a
+ * different name.
  *
  * Points are borrowed if they are float or double, interleaved (AOS) or with separate components (SOA); others are
  * copied to double.
