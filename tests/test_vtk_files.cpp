@@ -453,6 +453,8 @@ void wrong_series_are_refused_with_the_reason(void **)
     expect_refusal("a.pvd", head + "<DataSet timestep=\"1\"/>" + tail, "a DataSet names no file");
     expect_refusal("a.pvd", head + "<DataSet timestep=\"1\" file=\"none.vtu\"/>" + tail, "none.vtu: No such file");
     expect_refusal("a.pvd", head + "<DataSet timestep=\"1\" file=\"g.pvd\"/>" + tail, "a series within a series");
+    expect_refusal("a.pvd", head + "<DataSet timestep=\"1\" file=\"raw.vtu\"/><DataSet file=\"g.vts\"/>" + tail,
+                   "a.pvd: DataSet 2 (g.vts) has no timestep, which other DataSets have");
     expect_refusal("a.vtu.series", "{}", "no list \"files\"");
     expect_refusal("a.vtu.series", "{\"files\": [{\"name\": \"raw.vtu\"}]}", "\"time\" is no number");
     expect_refusal("a.vtu.series", "{\"files\": [3]}", "has no \"name\"");

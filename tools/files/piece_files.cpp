@@ -250,6 +250,19 @@ void sort_by_time(std::vector<series_step> &steps)
     std::stable_sort(steps.begin(), steps.end(), [](auto &a, auto &b) { return a.time < b.time; });
 }
 
+/* Checks whether the DataSets of a .pvd file have times. Throws if only some of them do, because the place of the
+ * others in the series is unknown. */
+bool have_times(const std::vector<vtkSmartPointer<vtkXMLDataElement>> &elements, const std::string &path)
+{
+    const auto lacks_time = [](const auto &element) { return !element->GetAttribute("timestep"); };
+    const auto first = std::find_if(elements.begin(), elements.end(), lacks_time);
+    if (first == elements.end()) return true;
+    if (std::all_of(elements.begin(), elements.end(), lacks_time)) return false;
+    const char *file = (*first)->GetAttribute("file");
+    refuse(path, "DataSet " + std::to_string(first - elements.begin() + 1) + " (" + (file ? file : "no file") +
+                     ") has no timestep, which other DataSets have");
+}
+
 Json::Value parse_json(const std::string &path)
 {
     std::ifstream in(path);
@@ -281,11 +294,10 @@ std::unique_ptr<data_file> open_pvtu(const std::string &path)
 std::unique_ptr<data_file> open_pvd(const std::string &path)
 {
     std::vector<series_step> steps;
-    bool has_times = true;
-    for (const auto &element : list_elements(read_list(path, "Collection"), "DataSet")) {
-        const char *text = element->GetAttribute("timestep");
-        has_times = has_times && text;
-        const double time = text ? parse_time(text, path) : 0;
+    const auto elements = list_elements(read_list(path, "Collection"), "DataSet");
+    const bool has_times = have_times(elements, path);
+    for (const auto &element : elements) {
+        const double time = has_times ? parse_time(element->GetAttribute("timestep"), path) : 0;
         const std::string file = file_named_by(element, "file", path);
         const auto same = std::find_if(steps.begin(), steps.end(), [=](auto &step) { return step.time == time; });
         if (same != steps.end())
