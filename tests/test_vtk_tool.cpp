@@ -560,6 +560,18 @@ void time_is_read_from_any_piece(void **)
     expect_result(run_ranks(3, "--steps 1 scene.yaml row_2.vtu row_10.vtu"), 0, "cycle 1  time 1  ");
 }
 
+void pieces_with_several_steps_are_refused(void **)
+{
+    const std::string head = "<VTKFile type=\"Collection\"><Collection>", tail = "</Collection></VTKFile>\n",
+                      first = "<DataSet timestep=\"0\" file=\"row_2.vtu\"/>";
+    write_file(make_path("one.pvd"), head + first + tail);
+    write_file(make_path("two.pvd"), head + first + "<DataSet timestep=\"1\" file=\"row_10.vtu\"/>" + tail);
+    expect_result(run_tool("--pieces scene.yaml row.vtu one.pvd"), 0, "  42 cells");
+    for (const int ranks : {1, 2})
+        expect_result(run_ranks(ranks, "--pieces scene.yaml row.vtu two.pvd"), 1,
+                      "insitu-render: two.pvd: has 2 steps, but files given with --pieces must have one");
+}
+
 /* Checks that no cell is missing for each method of reading and distributing cells. */
 void every_distribution_mode_reads_all_cells(void **)
 {
@@ -601,6 +613,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(time_is_read_from_any_piece),
+        cmocka_unit_test(pieces_with_several_steps_are_refused),
         cmocka_unit_test(every_distribution_mode_reads_all_cells),
     };
     return cmocka_run_group_tests(tests, make_files, nullptr);

@@ -51,10 +51,23 @@ step_source::step_source(const options &o, int rank, int ranks) : options_(o), r
         if (!why_not.empty()) throw std::runtime_error(why_not);
         warnings_ += make_next_file_warning(file, o.files);
     }
+    if (o.pieces) check_steps_of_pieces();
     int64_t cycle = 0;
     const size_t file_count = o.pieces ? 1 : o.files.size();
     for (size_t f = 0; f < file_count; f++) add_steps_of(f, cycle);
     if (steps_.empty()) throw std::runtime_error("--steps: none chosen of " + std::to_string(cycle));
+}
+
+/* Throws if a piece has several steps, because only one picture is drawn of all pieces. */
+void step_source::check_steps_of_pieces()
+{
+    for (size_t f = 0; f < options_.files.size(); f++) {
+        const std::string &path = options_.files[f];
+        const size_t steps = may_hold_steps(path) ? open(f).times().size() : 1;
+        if (steps > 1)
+            throw std::runtime_error(path + ": has " + std::to_string(steps) +
+                                     " steps, but files given with --pieces must have one");
+    }
 }
 
 void step_source::add_steps_of(size_t file, int64_t &cycle)

@@ -44,6 +44,7 @@ class step_source
         int64_t cycle;
         std::string name;
     };
+    void check_steps_of_pieces();
     void add_steps_of(size_t file, int64_t &cycle);
     data_file &open(size_t file);
     result read_pieces();
