@@ -356,6 +356,25 @@ void several_files_are_steps_in_the_order_of_their_numbers(void **)
     assert_int_equal(read_file(make_path("a_01.exr")).empty(), 0);
 }
 
+/* Checks the order of steps whose names have a point between two numbers. The names are given in reverse. */
+void decimals_and_numbers_after_a_point_are_sorted_by_value(void **)
+{
+    const std::vector<std::vector<std::string>> orders = {{"t0.25.vtu", "t0.5.vtu", "t0.75.vtu", "t1.0.vtu"},
+                                                          {"v1.9.vtu", "v1.10.vtu", "v1.11.vtu"},
+                                                          {"v1.2.9.vtu", "v1.2.11.vtu"},
+                                                          {"run.2.vtu", "run.11.vtu"}};
+    for (const std::vector<std::string> &names : orders) {
+        std::string given;
+        for (const std::string &name : names) {
+            std::filesystem::copy_file(make_path("row_2.vtu"), make_path(name),
+                                       std::filesystem::copy_options::overwrite_existing);
+            given = " " + name + given;
+        }
+        const run_result r = run_tool("scene.yaml" + given);
+        for (size_t i = 0; i < names.size(); i++) expect_result(r, 0, names[i] + "  cycle " + std::to_string(i));
+    }
+}
+
 void chosen_steps_keep_their_cycles(void **)
 {
     const run_result r = run_tool("--steps 1 scene.yaml row_2.vtu row_10.vtu");
@@ -606,6 +625,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
+        cmocka_unit_test(decimals_and_numbers_after_a_point_are_sorted_by_value),
         cmocka_unit_test(chosen_steps_keep_their_cycles),
         cmocka_unit_test(steps_before_the_first_value_of_a_field_are_skipped),
         cmocka_unit_test(default_field_is_one_that_the_last_step_has),

@@ -66,46 +66,69 @@ void parse_camera(const std::string &text, options &o)
     o.direction = direction;
 }
 
-/* A path, by whose numbers files are sorted. shape: the path with each sequence of digits replaced by '#'. Only paths
- * of the same shape are compared. */
+/* A path, by whose numbers files are sorted. Only paths with the same gaps and as many numbers are compared. */
 struct numbered_name {
-    std::string path, shape;
-    std::vector<std::string> numbers; // the sequences of digits in the path, without leading zeros
+    std::string path;
+    std::vector<std::string> numbers; // the sequences of digits in the path
+    std::vector<std::string> gaps;    // the text before each number, and the text after the last one if there is any
 
-    explicit numbered_name(const std::string &of) : path(of)
+    explicit numbered_name(const std::string &of) : path(of), gaps(1)
     {
-        for (size_t i = 0; i < of.size();) {
-            if (!std::isdigit(static_cast<unsigned char>(of[i]))) {
-                shape += of[i++];
-                continue;
-            }
-            const size_t begin = i;
-            while (i < of.size() && std::isdigit(static_cast<unsigned char>(of[i]))) i++;
-            const std::string run = of.substr(begin, i - begin);
-            numbers.push_back(run.substr(std::min(run.find_first_not_of('0'), run.size() - 1)));
-            shape += '#';
+        bool was_digit = false;
+        for (const char c : of) {
+            const bool is_digit = std::isdigit(static_cast<unsigned char>(c));
+            if (is_digit && !was_digit) numbers.emplace_back();
+            if (!is_digit && was_digit) gaps.emplace_back();
+            (is_digit ? numbers : gaps).back() += c;
+            was_digit = is_digit;
         }
-    }
-
-    bool operator<(const numbered_name &other) const
-    {
-        for (size_t i = 0; i < numbers.size(); i++) {
-            const std::string &a = numbers[i], &b = other.numbers[i];
-            if (a.size() != b.size()) return a.size() < b.size();
-            if (a != b) return a < b;
-        }
-        return false;
     }
 };
 
+/* Finds the numbers that are the decimals of the number before them, as in t0.25: only a point separates the two. In
+ * two cases these are numbers of their own: if there are more than two such numbers in a row, as in v1.2.3, and if one
+ * of the names has several digits there that end in 0, because v1.10 then follows v1.9. */
+std::vector<bool> find_decimals(const std::vector<numbered_name> &names)
+{
+    const std::vector<std::string> &gaps = names[0].gaps;
+    const auto follows_point = [&](size_t i) { return i > 0 && i < gaps.size() && gaps[i] == "."; };
+    const auto ends_in_zero = [](const std::string &digits) { return digits.size() > 1 && digits.back() == '0'; };
+    std::vector<bool> decimals(names[0].numbers.size());
+    for (size_t i = 1; i < decimals.size(); i++)
+        decimals[i] =
+            follows_point(i) && !follows_point(i - 1) && !(i + 1 < decimals.size() && follows_point(i + 1)) &&
+            std::none_of(names.begin(), names.end(), [&](auto &name) { return ends_in_zero(name.numbers[i]); });
+    return decimals;
+}
+
+/* Checks whether a name's numbers are before those of another. The first numbers that differ decide. */
+bool has_lower_numbers(const numbered_name &a, const numbered_name &b, const std::vector<bool> &decimals)
+{
+    const auto without_zeros = [](const std::string &digits) {
+        return digits.substr(std::min(digits.find_first_not_of('0'), digits.size() - 1));
+    };
+    for (size_t i = 0; i < decimals.size(); i++) {
+        std::string m = a.numbers[i], n = b.numbers[i];
+        if (!decimals[i]) {
+            m = without_zeros(m);
+            n = without_zeros(n);
+            if (m.size() != n.size()) return m.size() < n.size();
+        }
+        if (m != n) return m < n;
+    }
+    return false;
+}
+
 void sort_files_by_number(std::vector<std::string> &files)
 {
-    const std::vector<numbered_name> names(files.begin(), files.end());
-    auto like_first = [&](const numbered_name &n) { return n.shape == names[0].shape; };
+    std::vector<numbered_name> names(files.begin(), files.end());
+    auto like_first = [&](const numbered_name &n) {
+        return n.gaps == names[0].gaps && n.numbers.size() == names[0].numbers.size();
+    };
     if (names.empty() || !std::all_of(names.begin(), names.end(), like_first)) return;
-    std::vector<numbered_name> sorted = names;
-    std::stable_sort(sorted.begin(), sorted.end());
-    for (size_t i = 0; i < files.size(); i++) files[i] = sorted[i].path;
+    const std::vector<bool> decimals = find_decimals(names);
+    std::stable_sort(names.begin(), names.end(), [&](auto &a, auto &b) { return has_lower_numbers(a, b, decimals); });
+    for (size_t i = 0; i < files.size(); i++) files[i] = names[i].path;
 }
 
 /* Keeps one file of each parallel run's Exodus output, because any of its files represents all of them. */
