@@ -88,9 +88,20 @@ int count_near(const picture &p, const colour &c)
 
 using field = double (*)(const std::array<double, 3> &at);
 
+/* Adds a point that no cell uses and a line, far away and with other values. */
+void add_stray_points(vtkUnstructuredGrid *grid, vtkPoints *points, vtkDoubleArray *values)
+{
+    for (const double at : {30.0, 40.0, 50.0}) {
+        points->InsertNextPoint(at, -at, 2 * at);
+        values->InsertNextValue(10 * at);
+    }
+    const vtkIdType ends[2] = {points->GetNumberOfPoints() - 2, points->GetNumberOfPoints() - 1};
+    grid->InsertNextCell(VTK_LINE, 2, ends);
+}
+
 /* Writes the cells of a lattice over [-1, 1] along all axes except `without`. If `without` is not an axis, the cells
  * are hexahedra. */
-void write_lattice(const std::string &name, int without, field f)
+void write_lattice(const std::string &name, int without, field f, bool with_stray_points = false)
 {
     constexpr int cells = 12, side = cells + 1;
     const std::array<int, 3> sides = {without == 0 ? 1 : side, without == 1 ? 1 : side, without == 2 ? 1 : side};
@@ -119,6 +130,7 @@ void write_lattice(const std::string &name, int without, field f)
                 else
                     grid->InsertNextCell(VTK_QUAD, 4, ids);
             }
+    if (with_stray_points) add_stray_points(grid, points, values);
     grid->SetPoints(points);
     grid->GetPointData()->AddArray(values);
     vtkNew<vtkXMLUnstructuredGridWriter> writer;
@@ -167,6 +179,25 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
     }
 }
 
+/* Checks solids and flat meshes with points and lines that are not drawn: camera, colours and cut must be those of the
+ * mesh without them, for a single file and for a series. */
+void points_and_lines_that_are_not_drawn_change_no_picture(void **)
+{
+    const auto draw_both = [](int without, bool with_stray_points) {
+        for (const std::string name : {"stray_0.vtu", "stray_1.vtu"})
+            write_lattice(
+                name, without, [](auto &at) { return at[0] + 2 * at[2]; }, with_stray_points);
+        return std::array<picture, 3>{draw_default("stray_0.vtu", "stray_0_0000.png"),
+                                      draw_default("stray_0.vtu stray_1.vtu", "stray_0_0000.png"),
+                                      draw_default("stray_0.vtu stray_1.vtu", "stray_0_0000.png", 2)};
+    };
+    for (const int without : {-1, 1}) {
+        const auto expected = draw_both(without, false), found = draw_both(without, true);
+        for (size_t i = 0; i < expected.size(); i++)
+            if (expected[i].rgb != found[i].rgb) fail_msg("lattice without axis %d: picture %zu differs", without, i);
+    }
+}
+
 /* Checks that the only step of a run reports faults of the picture's texts, and that the warning about a missing glyph
  * does not hide the one about missing space. */
 void faults_of_words_are_reported_in_a_run_of_one_step(void **)
@@ -200,6 +231,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_solid_with_a_dark_outside_is_cut_open),
         cmocka_unit_test(a_solid_whose_outside_shows_the_field_is_drawn_whole),
         cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
+        cmocka_unit_test(points_and_lines_that_are_not_drawn_change_no_picture),
         cmocka_unit_test(faults_of_words_are_reported_in_a_run_of_one_step),
     };
     return cmocka_run_group_tests(tests, set_up_test_group, nullptr);

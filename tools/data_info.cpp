@@ -23,6 +23,8 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
+#include "drawn_cells.h"
+
 namespace render_tool
 {
 
@@ -69,8 +71,6 @@ bool has(const std::vector<bool> &selected, vtkIdType i)
 
 selection select_visible(vtkUnstructuredGrid *grid)
 {
-    constexpr int hiding =
-        vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
     selection shown;
     vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
     if (!ghosts || ghosts->GetNumberOfValues() != grid->GetNumberOfCells()) return shown;
@@ -78,7 +78,7 @@ selection select_visible(vtkUnstructuredGrid *grid)
     shown.points.resize(static_cast<size_t>(grid->GetNumberOfPoints()));
     bool is_all = true;
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
-        if (ghosts->GetValue(i) & hiding) {
+        if (ghosts->GetValue(i) & hiding_flags) {
             is_all = false;
             continue;
         }
@@ -128,10 +128,8 @@ void add_bounds(vtkPoints *points, const std::vector<bool> &selected, vtkBoundin
         if (has(selected, i)) bounds.AddPoint(points->GetPoint(i));
 }
 
-void add_leaf(vtkDataObject *object, data_summary &all)
+void add_grid(vtkUnstructuredGrid *grid, data_summary &all)
 {
-    auto *grid = vtkUnstructuredGrid::SafeDownCast(object);
-    if (!grid) return;
     const selection shown = select_visible(grid);
     all.leaves++;
     all.points += grid->GetNumberOfPoints();
@@ -146,16 +144,22 @@ void add_leaf(vtkDataObject *object, data_summary &all)
     add_arrays(grid->GetCellData(), shown.cells, all.fields[1]);
 }
 
-data_summary summarize(vtkDataObject *data)
+/* Summarizes all leaves of the data. If only_drawn is set, points, lines, and points that no drawn cell uses are left
+ * out, in addition to hidden cells. */
+data_summary summarize(vtkDataObject *data, bool only_drawn)
 {
     data_summary all;
+    const auto add_leaf = [&](vtkDataObject *leaf) {
+        auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf);
+        if (grid) add_grid(only_drawn ? extract_drawn_cells(grid) : vtkSmartPointer<vtkUnstructuredGrid>(grid), all);
+    };
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) {
-        add_leaf(data, all);
+        add_leaf(data);
         return all;
     }
     const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem()) add_leaf(it->GetCurrentDataObject(), all);
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem()) add_leaf(it->GetCurrentDataObject());
     return all;
 }
 
@@ -205,7 +209,7 @@ void print_times(const std::vector<double> &times)
 
 void print_info(const std::string &title, vtkDataObject *data, const std::vector<double> &times)
 {
-    const data_summary all = summarize(data);
+    const data_summary all = summarize(data, false);
     int64_t cells = 0;
     for (const auto &[type, count] : all.cells) cells += count;
     std::printf("%s", title.c_str());
@@ -235,7 +239,7 @@ data_extent::data_extent()
 
 void add_extent(vtkDataObject *data, const std::string &field, data_extent &extent)
 {
-    const data_summary all = summarize(data);
+    const data_summary all = summarize(data, true);
     for (int axis = 0; all.bounds.IsValid() && axis < 3; axis++) {
         extent.low[axis] = std::min(extent.low[axis], all.bounds.GetMinPoint()[axis]);
         extent.high[axis] = std::max(extent.high[axis], all.bounds.GetMaxPoint()[axis]);

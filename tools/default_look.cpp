@@ -26,6 +26,7 @@
 #include <vtkUnstructuredGrid.h>
 
 #include "data_file.h"
+#include "drawn_cells.h"
 #include "grids_of.h"
 
 namespace render_tool
@@ -40,14 +41,17 @@ constexpr vector default_direction = {1, 0.8, 1.2};
 constexpr double interior_threshold = 0.35; // the interior is shown if the outer surface shows less than this fraction
                                             // of the field's range
 
-using grid_list = std::vector<vtkUnstructuredGrid *>;
+using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
 
+/* Returns the grids in data, with only those cells and points that are drawn. */
 grid_list list_grids(vtkDataObject *data)
 {
     grid_list grids;
     const auto add = [&](vtkDataObject *leaf) {
-        auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf);
-        if (grid && grid->GetNumberOfCells() > 0) grids.push_back(grid);
+        auto *const grid = vtkUnstructuredGrid::SafeDownCast(leaf);
+        if (!grid) return;
+        const auto drawn = extract_drawn_cells(grid);
+        if (drawn->GetNumberOfCells() > 0) grids.push_back(drawn);
     };
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) {
