@@ -198,6 +198,42 @@ void points_and_lines_that_are_not_drawn_change_no_picture(void **)
     }
 }
 
+void write_grid_without_cells(const std::string &name)
+{
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetFileName((folder + "/" + name).c_str());
+    writer->SetInputData(vtkNew<vtkUnstructuredGrid>());
+    assert_int_equal(writer->Write(), 1);
+}
+
+/* Checks that the default picture of pieces does not depend on their order. In the first pair one piece has neither
+ * cells nor fields. The second pair are flat meshes that are perpendicular to each other; pixels where they meet may
+ * differ. */
+void pieces_are_drawn_the_same_in_any_order(void **)
+{
+    const auto write_empty = [](const std::string &name) { write_grid_without_cells(name); };
+    const auto write_x = [](const std::string &name) {
+        write_lattice(name, 0, [](auto &at) { return at[1] + at[2]; });
+    };
+    const auto write_y = [](const std::string &name) {
+        write_lattice(name, 1, [](auto &at) { return at[0] + at[2]; });
+    };
+    using write_function = void (*)(const std::string &);
+    const std::array<std::array<write_function, 2>, 2> pairs = {{{write_empty, write_x}, {write_x, write_y}}};
+    for (const auto &pair : pairs) {
+        std::vector<picture> pictures;
+        for (const size_t first : {size_t{0}, size_t{1}}) {
+            pair[first]("a.vtu");
+            pair[1 - first]("b.vtu");
+            pictures.push_back(draw_default("--pieces a.vtu b.vtu", "a_0000.png", 2));
+        }
+        int different = 0;
+        for (int y = 0; y < height; y++)
+            for (int x = 0; x < width; x++) different += !is_near(pictures[0].at(x, y), pictures[1].at(x, y));
+        assert_true(different < 100);
+    }
+}
+
 /* Checks that the only step of a run reports faults of the picture's texts, and that the warning about a missing glyph
  * does not hide the one about missing space. */
 void faults_of_words_are_reported_in_a_run_of_one_step(void **)
@@ -232,6 +268,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_solid_whose_outside_shows_the_field_is_drawn_whole),
         cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
         cmocka_unit_test(points_and_lines_that_are_not_drawn_change_no_picture),
+        cmocka_unit_test(pieces_are_drawn_the_same_in_any_order),
         cmocka_unit_test(faults_of_words_are_reported_in_a_run_of_one_step),
     };
     return cmocka_run_group_tests(tests, set_up_test_group, nullptr);

@@ -20,6 +20,7 @@
 #include <vtkDataSetSurfaceFilter.h>
 #include <vtkGenericCell.h>
 #include <vtkMath.h>
+#include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
@@ -223,10 +224,17 @@ std::array<int, 3> choose_cut_normal(const vtkBoundingBox &bounds, const vector 
     return cut;
 }
 
-vtkSmartPointer<vtkDataObject> read_whole_step(const step_source &source, size_t step)
+/* Reads a step of all ranks. The files given with --pieces are one step. */
+vtkSmartPointer<vtkDataObject> read_whole_step(const options &o, const step_source &source, size_t step)
 {
-    const std::string &path = source.path(step);
-    return grids_of(open_data_file(path)->read(source.index_in_file(step), 0, 1), path);
+    const auto read = [](const std::string &path, size_t index) {
+        return grids_of(open_data_file(path)->read(index, 0, 1), path);
+    };
+    if (!o.pieces) return read(source.path(step), source.index_in_file(step));
+    auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+    all->SetNumberOfBlocks(static_cast<unsigned>(o.files.size()));
+    for (size_t f = 0; f < o.files.size(); f++) all->SetBlock(static_cast<unsigned>(f), read(o.files[f], 0));
+    return all;
 }
 
 } // namespace
@@ -250,14 +258,14 @@ std::array<double, 3> up_direction(const options &o)
 
 default_look choose_look(const options &o, const step_source &source)
 {
-    const auto data = read_whole_step(source, 0);
+    const auto data = read_whole_step(o, source, 0);
     const grid_list grids = list_grids(data);
     default_look look;
     look.field = o.field;
     if (o.field.empty()) {
         const std::vector<std::string> names = list_field_names(grids);
         const size_t last = source.count() - 1;
-        look.field = choose_field(names, last ? list_field_names(list_grids(read_whole_step(source, last))) : names);
+        look.field = choose_field(names, last ? list_field_names(list_grids(read_whole_step(o, source, last))) : names);
     }
     vtkBoundingBox bounds;
     int dimension = 0;
