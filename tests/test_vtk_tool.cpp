@@ -333,6 +333,30 @@ void default_pictures_of_two_files_have_two_names(void **)
     assert_true(fs::exists(here / "sheet_0000.png"));
 }
 
+/* Checks names that are longer than a title and whose characters have several bytes, and names that look like
+ * placeholders. */
+void default_pictures_of_files_with_unusual_names_are_drawn(void **)
+{
+    namespace fs = std::filesystem;
+    const fs::path here = make_path("unusual");
+    std::string umlauts, shifted = "a", ideographs;
+    for (int i = 0; i < 31; i++) {
+        umlauts += "\u00e4";
+        shifted += "\u00e4";
+        ideographs += "\u540d";
+    }
+    for (const std::string &name : {umlauts, shifted, ideographs, std::string("a{b}c"), std::string("{cycle}")}) {
+        fs::remove_all(here);
+        fs::create_directories(here);
+        fs::copy_file(make_path("row_2.vtu"), here / (name + ".vtu"));
+        const run_result r =
+            run_in_folder(here, quote_for_shell(tool) + " --size 32x24 " + quote_for_shell(name + ".vtu"));
+        expect_result(r, 0, "1 picture");
+        assert_false(r.contains_text("YAML"));
+    }
+    assert_true(fs::exists(here / "{cycle}_0000.png"));
+}
+
 void empty_input_is_an_error(void **)
 {
     expect_result(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
@@ -621,6 +645,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(failure_on_one_rank_stops_all_ranks),
         cmocka_unit_test(read_failure_on_one_rank_stops_all_ranks),
         cmocka_unit_test(default_pictures_of_two_files_have_two_names),
+        cmocka_unit_test(default_pictures_of_files_with_unusual_names_are_drawn),
         cmocka_unit_test(empty_input_is_an_error),
         cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),

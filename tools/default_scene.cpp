@@ -33,6 +33,24 @@ std::string quoted(const std::string &text)
     return out + '"';
 }
 
+/* Returns the beginning of a text in UTF-8: as many whole characters as fit into this number of bytes. */
+std::string get_beginning(const std::string &text, size_t size)
+{
+    const auto continues_character = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
+    while (size > 0 && size < text.size() && continues_character(text[size])) size--;
+    return text.substr(0, size);
+}
+
+/* Returns the title of a file's pictures. A title cannot contain braces, because they enclose placeholders, so they are
+ * replaced by brackets. */
+std::string make_title(const std::filesystem::path &file)
+{
+    std::string title = get_beginning(file.stem().string(), 60);
+    std::replace(title.begin(), title.end(), '{', '(');
+    std::replace(title.begin(), title.end(), '}', ')');
+    return title;
+}
+
 std::string format_list(const std::array<double, 3> &v)
 {
     std::ostringstream text;
@@ -90,7 +108,7 @@ std::string picture_name(const std::filesystem::path &file)
     std::string apart;
     if (folder != here) apart = folder.string();
     if (stem.size() > 60 || is_shared_name(file, stem)) apart += '/' + file.filename().string();
-    return apart.empty() ? stem : stem.substr(0, 51) + '_' + hash_digits(apart);
+    return apart.empty() ? stem : get_beginning(stem, 51) + '_' + hash_digits(apart);
 }
 
 } // namespace
@@ -111,8 +129,7 @@ std::string default_scene(const options &o, const default_look &look, const data
     scene << "    layers:\n      - surface: {" << (look.field.empty() ? "" : "colour_by: {" + colour.str() + "}");
     scene << "}\n";
     if (look.is_cut()) scene << "      - slice: {" << colour.str() << ", " << plane << "}\n";
-    scene << "    decorations: {title: " << quoted(file.stem().string().substr(0, 60))
-          << ", text: [{text: \"t = {time}\"}], "
+    scene << "    decorations: {title: " << quoted(make_title(file)) << ", text: [{text: \"t = {time}\"}], "
           << (look.flat_axis >= 0 ? "rulers: true" : "outline: true, axes: true")
           << (look.field.empty() ? "" : ", colour_bar: {}") << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
     return scene.str();
