@@ -28,6 +28,7 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUniformGridAMRWriter.h>
+#include <vtkXMLUnstructuredGridWriter.h>
 
 #include "data_file.h"
 #include "grids_of.h"
@@ -597,6 +598,38 @@ void numbers_without_the_letter_of_their_exponent_are_refused(void **)
         }
 }
 
+std::string replace_text(std::string text, const std::string &old, const std::string &by)
+{
+    const size_t at = text.find(old);
+    assert_true(at != std::string::npos);
+    return text.replace(at, old.size(), by);
+}
+
+/* Checks files in which a '>' does not end a tag, or blanks surround '=': their values are not text. */
+void tags_end_at_their_own_bracket(void **)
+{
+    const auto grid = make_hex_grid(lattice::curved);
+    vtkDataArray *const x = grid->GetPointData()->GetArray("x");
+    x->SetName("a>b format='ascii'");
+    write_vtu(folder + "/bracket.vtu", grid);
+    assert_string_equal(get_refusal("bracket.vtu").c_str(), "");
+    assert_non_null(read_grid("bracket.vtu")->GetPointData()->GetArray("a>b format='ascii'"));
+    x->SetName("x");
+
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetFileName((folder + "/blanks.vtu").c_str());
+    writer->SetInputData(grid);
+    writer->SetDataModeToBinary();
+    assert_int_equal(writer->Write(), 1);
+    std::string text = read_file(folder + "/blanks.vtu");
+    for (size_t at = 0; (at = text.find("format=\"binary\"", at)) != std::string::npos; at += 17)
+        text.replace(at, 15, "format = 'binary'");
+    const std::string comment = "<!-- a -> b <DataArray format=\"ascii\"> not a number -->\n<PointData";
+    write_file(folder + "/blanks.vtu", replace_text(text, "<PointData", comment));
+    assert_string_equal(get_refusal("blanks.vtu").c_str(), "");
+    assert_string_equal(describe_difference(read_grid("blanks.vtu"), grid, true).c_str(), "");
+}
+
 void ensight_numbers_without_exponent_letter_are_refused(void **)
 {
     const std::string path = folder + "/t.x", whole = read_file(path);
@@ -749,6 +782,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(colours_of_legacy_files_are_fields),
         cmocka_unit_test(grids_without_cells_are_accepted),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
+        cmocka_unit_test(tags_end_at_their_own_bracket),
         cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),
         cmocka_unit_test(ensight_file_sets_are_read_step_by_step),
         cmocka_unit_test(ensight_values_that_are_undefined_are_nan),

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "piece_check.h"
+#include "xml_tag.h"
 
 namespace render_tool
 {
@@ -31,12 +32,30 @@ size_t skip_digits(const std::string &word, size_t &at)
     return at - first;
 }
 
+/* Reads a tag or a comment, of which '<' has been read, up to its '>'. Returns what is in between, with a blank for
+ * each white-space character; "" at the end of the file. A '>' in quotes or within a comment ends neither. */
+std::string read_tag(std::streambuf *in, int64_t &offset)
+{
+    std::string tag;
+    char quote = 0;
+    for (int c = in->sbumpc(); c != std::char_traits<char>::eof(); c = in->sbumpc()) {
+        offset++;
+        const bool is_comment = tag.compare(0, 3, "!--") == 0;
+        if (c == '>' && (is_comment ? tag.size() >= 5 && tag.compare(tag.size() - 2, 2, "--") == 0 : quote == 0))
+            return tag;
+        if (!is_comment && (c == '"' || c == '\'') && (quote == 0 || quote == c))
+            quote = quote == 0 ? static_cast<char>(c) : '\0';
+        tag += is_blank(c) ? ' ' : static_cast<char>(c);
+    }
+    return "";
+}
+
 /* Checks whether the element that begins with `tag` contains text values, which is the default of VTK's readers. */
 bool has_text_values(const std::string &tag)
 {
     if (tag.compare(0, 10, "DataArray ") != 0 || tag.back() == '/') return false;
-    const size_t format = tag.find(" format=");
-    return format == std::string::npos || tag.compare(format + 9, 5, "ascii") == 0;
+    const std::string format = get_xml_attribute(tag, "format");
+    return format.empty() || format == "ascii";
 }
 
 /* Throws if one of the words before the next tag is not a number. */
@@ -88,18 +107,13 @@ void check_xml_tags(const std::string &path)
     std::ifstream in(path, std::ios::binary);
     std::streambuf *bytes = in.rdbuf();
     int64_t offset = 0;
-    const int end = std::char_traits<char>::eof();
-    std::string tag;
     piece_check pieces;
-    for (int c = bytes->sbumpc(); c != end; c = bytes->sbumpc()) {
+    for (int c = bytes->sbumpc(); c != std::char_traits<char>::eof(); c = bytes->sbumpc()) {
         offset++;
         if (c != '<') continue;
-        tag.clear();
-        for (c = bytes->sbumpc(); c != end && c != '>'; c = bytes->sbumpc()) tag += static_cast<char>(c);
-        offset += static_cast<int64_t>(tag.size()) + 1;
-        if (c == end || tag.compare(0, 12, "AppendedData") == 0) break;
-        std::replace_if(tag.begin(), tag.end(), is_blank, ' ');
-        if (!tag.empty()) pieces.add_tag(tag);
+        const std::string tag = read_tag(bytes, offset);
+        if (tag.empty() || tag.compare(0, 12, "AppendedData") == 0) break;
+        pieces.add_tag(tag);
         if (has_text_values(tag)) check_words(path, bytes, offset);
     }
     pieces.check(path);

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "xml_tag.h"
+
 namespace render_tool
 {
 
@@ -15,24 +17,11 @@ bool begins(const std::string &tag, const std::string &element)
     return tag.size() == element.size() || tag[element.size()] == ' ' || tag[element.size()] == '/';
 }
 
-/* Returns the value of an attribute, or "" if the tag does not have it. */
-std::string get_attribute(const std::string &tag, const std::string &name)
-{
-    for (const char quote : {'"', '\''}) {
-        const std::string start = ' ' + name + '=' + quote;
-        const size_t at = tag.find(start);
-        if (at == std::string::npos) continue;
-        const size_t first = at + start.size();
-        return tag.substr(first, tag.find(quote, first) - first);
-    }
-    return "";
-}
-
 /* Returns the description of an array for comparisons and messages, such as "u (Float64, 3 components)". */
 std::string describe_array(const std::string &tag)
 {
-    const std::string components = get_attribute(tag, "NumberOfComponents");
-    return get_attribute(tag, "Name") + " (" + get_attribute(tag, "type") +
+    const std::string components = get_xml_attribute(tag, "NumberOfComponents");
+    return get_xml_attribute(tag, "Name") + " (" + get_xml_attribute(tag, "type") +
            (components.empty() || components == "1" ? ")" : ", " + components + " components)");
 }
 
@@ -42,8 +31,8 @@ void piece_check::add_tag(const std::string &tag)
 {
     const bool is_closed = tag.back() == '/';
     if (begins(tag, "Piece")) {
-        const bool has_no_points = get_attribute(tag, "NumberOfPoints") == "0",
-                   has_no_cells = get_attribute(tag, "NumberOfCells") == "0";
+        const bool has_no_points = get_xml_attribute(tag, "NumberOfPoints") == "0",
+                   has_no_cells = get_xml_attribute(tag, "NumberOfCells") == "0";
         list_ = nullptr;
         pieces_.push_back({{}, {has_no_points, has_no_points || has_no_cells}});
     } else if (begins(tag, "/PointData") || begins(tag, "/CellData")) {
