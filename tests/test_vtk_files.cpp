@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <vtkAMRBox.h>
+#include <vtkBitArray.h>
 #include <vtkCell.h>
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
@@ -23,6 +24,7 @@
 #include <vtkNew.h>
 #include <vtkOverlappingAMR.h>
 #include <vtkPointData.h>
+#include <vtkStringArray.h>
 #include <vtkStructuredGrid.h>
 #include <vtkUniformGrid.h>
 #include <vtkUnsignedCharArray.h>
@@ -558,6 +560,34 @@ void grids_without_cells_are_accepted(void **)
                         "");
 }
 
+/* Checks that a piece with texts and bits, which its .pvtu file declares as VTK's writer does, causes no warning. */
+void texts_and_bits_of_pieces_cause_no_warning(void **)
+{
+    const auto grid = make_hex_grid(lattice::curved);
+    vtkNew<vtkStringArray> label;
+    vtkNew<vtkBitArray> bits;
+    label->SetName("label");
+    bits->SetName("bits");
+    for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++) {
+        label->InsertNextValue("text");
+        bits->InsertNextValue(static_cast<int>(i % 2));
+    }
+    grid->GetPointData()->AddArray(label);
+    grid->GetPointData()->AddArray(bits);
+    write_vtu(folder + "/texts.vtu", grid);
+    write_file(folder + "/texts.pvtu",
+               "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid GhostLevel=\"0\"><PPointData>"
+               "<PDataArray type=\"Float64\" Name=\"x\"/><PArray type=\"String\" Name=\"label\"/>"
+               "<PDataArray type=\"Bit\" Name=\"bits\"/></PPointData><PCellData>"
+               "<PDataArray type=\"Float64\" Name=\"c\"/><PDataArray type=\"Float64\" Name=\"p\"/></PCellData>"
+               "<Piece Source=\"texts.vtu\"/></PUnstructuredGrid></VTKFile>\n");
+    const auto file = open_data_file(folder + "/texts.pvtu");
+    const auto read = find_only_grid(grids_of(file->read(0, 0, 1), ""));
+    assert_int_equal(read->GetNumberOfCells(), 60);
+    const std::string warnings = file->take_warnings();
+    for (const char *name : {"label", "bits"}) assert_true(warnings.find(name) == std::string::npos);
+}
+
 /* Checks text files in which the last value is replaced by a number in Fortran's notation without the letter of the
  * exponent. */
 void numbers_without_the_letter_of_their_exponent_are_refused(void **)
@@ -781,6 +811,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(pieces_of_one_file_with_different_fields_are_refused),
         cmocka_unit_test(colours_of_legacy_files_are_fields),
         cmocka_unit_test(grids_without_cells_are_accepted),
+        cmocka_unit_test(texts_and_bits_of_pieces_cause_no_warning),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
         cmocka_unit_test(tags_end_at_their_own_bracket),
         cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),

@@ -40,6 +40,7 @@ bool is_ghost_array(const std::string &name)
 std::string type_name(vtkDataArray *array)
 {
     const int bits = 8 * array->GetDataTypeSize(), type = array->GetDataType();
+    if (type == VTK_BIT) return "Bit";
     if (type == VTK_FLOAT || type == VTK_DOUBLE) return "Float" + std::to_string(bits);
     return (array->GetDataTypeMin() < 0 ? "Int" : "UInt") + std::to_string(bits);
 }
@@ -54,6 +55,7 @@ vtkSmartPointer<vtkDoubleArray> convert_to_doubles(const std::string &name, int 
     return array;
 }
 
+/* Removes the arrays that are not declared. There is no warning about arrays of texts, because they are no fields. */
 void remove_undeclared(vtkDataSetAttributes *data, bool is_at_points, const std::vector<declared_field> &fields,
                        const std::string &piece, std::string &warnings)
 {
@@ -62,12 +64,13 @@ void remove_undeclared(vtkDataSetAttributes *data, bool is_at_points, const std:
         const std::string name = text ? text : "";
         const auto is_same = [&](const declared_field &f) { return f.is_at_points == is_at_points && f.name == name; };
         if (is_ghost_array(name) || std::any_of(fields.begin(), fields.end(), is_same)) continue;
-        warnings.append(piece)
-            .append(": has a field \"")
-            .append(name)
-            .append("\", which the file that names the piece does not declare for ")
-            .append(is_at_points ? "points" : "cells")
-            .append(": left out\n");
+        if (data->GetArray(i))
+            warnings.append(piece)
+                .append(": has a field \"")
+                .append(name)
+                .append("\", which the file that names the piece does not declare for ")
+                .append(is_at_points ? "points" : "cells")
+                .append(": left out\n");
         data->RemoveArray(i);
     }
 }
