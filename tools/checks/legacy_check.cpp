@@ -122,7 +122,7 @@ class legacy_parser
         const int64_t bytes = compute_size_of_values(values, type);
         if (bytes < 0) return false;
         if (is_text_) {
-            skip_words(values);
+            skip_words(values, type == "float");
             return true;
         }
         if (bytes > size_ - static_cast<int64_t>(in_.tellg())) fail("values of \"" + words_[0] + "\" are missing");
@@ -130,7 +130,7 @@ class legacy_parser
         return true;
     }
 
-    void skip_words(int64_t count)
+    void skip_words(int64_t count, bool is_single)
     {
         std::streambuf *bytes = in_.rdbuf();
         const int end = std::char_traits<char>::eof();
@@ -140,7 +140,7 @@ class legacy_parser
             if (c == end) fail("values of \"" + words_[0] + "\" are missing");
             std::string value;
             for (; c != end && !std::isspace(c); c = bytes->snextc()) value += static_cast<char>(c);
-            if (!is_number(value))
+            if (!is_readable_number(value, false, is_single))
                 refuse_number(path_, value, static_cast<int64_t>(in_.tellg()) - static_cast<int64_t>(value.size()));
         }
     }

@@ -1,7 +1,8 @@
 #include "number_check.h"
 
-#include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 
@@ -58,8 +59,9 @@ bool has_text_values(const std::string &tag)
     return format.empty() || format == "ascii";
 }
 
-/* Throws if one of the words before the next tag is not a number. */
-void check_words(const std::string &path, std::streambuf *in, int64_t &offset)
+/* Throws if VTK does not read one of the words before the next tag as a number. It reads nan and inf only if a blank
+ * follows. */
+void check_words(const std::string &path, std::streambuf *in, bool is_single, int64_t &offset)
 {
     std::string word;
     const int end = std::char_traits<char>::eof();
@@ -68,7 +70,8 @@ void check_words(const std::string &path, std::streambuf *in, int64_t &offset)
             word += static_cast<char>(c);
             continue;
         }
-        if (!word.empty() && !is_number(word)) refuse_number(path, word, offset - static_cast<int64_t>(word.size()));
+        if (!word.empty() && !is_readable_number(word, is_blank(c), is_single))
+            refuse_number(path, word, offset - static_cast<int64_t>(word.size()));
         word.clear();
         if (c == end || c == '<') return;
     }
@@ -94,12 +97,24 @@ bool is_number(const std::string &word)
     return skip_digits(word, at) > 0 && at == word.size();
 }
 
+bool is_readable_number(const std::string &word, bool has_names, bool is_single)
+{
+    constexpr size_t digits_of_largest_float = 38;
+    if (!is_number(word)) return false;
+    if (std::isalpha(static_cast<unsigned char>(word.back())))
+        return has_names && word.size() == (std::isalpha(static_cast<unsigned char>(word[0])) ? 3U : 4U);
+    if (word.size() <= digits_of_largest_float && word.find_first_of("eE") == std::string::npos) return true;
+    return is_single ? std::isfinite(std::strtof(word.c_str(), nullptr))
+                     : std::isfinite(std::strtod(word.c_str(), nullptr));
+}
+
 void refuse_number(const std::string &path, const std::string &word, int64_t offset)
 {
     std::ifstream in(path, std::ios::binary);
     int64_t line = 1;
     for (int64_t i = 0; i < offset && in; i++) line += in.get() == '\n';
-    throw std::runtime_error(path + ": line " + std::to_string(line) + ": \"" + word.substr(0, 60) + "\" is no number");
+    throw std::runtime_error(path + ": line " + std::to_string(line) + ": \"" + word.substr(0, 60) + "\" is " +
+                             (is_number(word) ? "a number that VTK does not read here" : "no number"));
 }
 
 void check_xml_tags(const std::string &path)
@@ -114,7 +129,7 @@ void check_xml_tags(const std::string &path)
         const std::string tag = read_tag(bytes, offset);
         if (tag.empty() || tag.compare(0, 12, "AppendedData") == 0) break;
         pieces.add_tag(tag);
-        if (has_text_values(tag)) check_words(path, bytes, offset);
+        if (has_text_values(tag)) check_words(path, bytes, get_xml_attribute(tag, "type") == "Float32", offset);
     }
     pieces.check(path);
 }

@@ -12,11 +12,16 @@ namespace render_tool
 /* Checks whether a word is a number in the syntax of C: 1, -2.5, 1e-101, nan, inf. */
 bool is_number(const std::string &word);
 
-/* Throws a std::runtime_error whose message contains the word and the number of the file's line at this byte offset. */
+/* Checks whether VTK reads a word as a number. It reads the names nan and inf only in XML files (has_names). It does
+ * not read "infinity", nor numbers beyond the range of double, or of float if is_single is set. */
+bool is_readable_number(const std::string &word, bool has_names, bool is_single);
+
+/* Throws a std::runtime_error whose message contains the word, what is wrong with it, and the number of the file's line
+ * at this byte offset. */
 [[noreturn]] void refuse_number(const std::string &path, const std::string &word, int64_t offset);
 
-/* Throws std::runtime_error, as refuse_number() does, if a data array of a VTK XML file contains a word that is not a
- * number. Throws too if the pieces in the file have different fields (piece_check.h). */
+/* Throws std::runtime_error, as refuse_number() does, if a data array of a VTK XML file contains a word that VTK does
+ * not read as a number. Throws too if the pieces in the file have different fields (piece_check.h). */
 void check_xml_tags(const std::string &path);
 
 } // namespace render_tool

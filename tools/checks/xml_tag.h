@@ -1,6 +1,6 @@
 /* Reads the tags of VTK's XML files. */
-#ifndef TOOLS_XML_TAG_H
-#define TOOLS_XML_TAG_H
+#ifndef XML_TAG_H
+#define XML_TAG_H
 
 #include <string>
 
