@@ -333,8 +333,8 @@ void default_pictures_of_two_files_have_two_names(void **)
     assert_true(fs::exists(here / "sheet_0000.png"));
 }
 
-/* Checks names that are longer than a title and whose characters have several bytes, and names that look like
- * placeholders. */
+/* Checks names that are longer than a title and whose characters have several bytes, names that look like
+ * placeholders, and names that are not UTF-8. */
 void default_pictures_of_files_with_unusual_names_are_drawn(void **)
 {
     namespace fs = std::filesystem;
@@ -345,7 +345,8 @@ void default_pictures_of_files_with_unusual_names_are_drawn(void **)
         shifted += "\u00e4";
         ideographs += "\u540d";
     }
-    for (const std::string &name : {umlauts, shifted, ideographs, std::string("a{b}c"), std::string("{cycle}")}) {
+    for (const std::string &name : {umlauts, shifted, ideographs, std::string("a{b}c"), std::string("\xe4 in Latin-1"),
+                                    std::string("delete\x7f"), std::string("{cycle}")}) {
         fs::remove_all(here);
         fs::create_directories(here);
         fs::copy_file(make_path("row_2.vtu"), here / (name + ".vtu"));

@@ -16,19 +16,39 @@ namespace render_tool
 namespace
 {
 
-/* Returns the text as a double-quoted scalar of YAML. */
+/* Returns the number of bytes of the character of UTF-8 that begins at this index. Returns 0 if the bytes there are no
+ * character, or a control character. */
+size_t get_character_length(const std::string &text, size_t at)
+{
+    const auto byte = [&](size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+    const unsigned first = byte(at), second = byte(at + 1);
+    if (first < 0x80) return first < 0x20 || first == 0x7f ? 0 : 1;
+    const size_t length = first < 0xc2 ? 0 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : first < 0xf5 ? 4 : 0;
+    for (size_t i = 1; i < length; i++)
+        if ((byte(at + i) & 0xc0) != 0x80) return 0;
+    const bool is_control = first == 0xc2 && second < 0xa0, is_surrogate = first == 0xed && second >= 0xa0,
+               is_too_long = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90),
+               is_too_large = first == 0xf4 && second >= 0x90;
+    return is_control || is_surrogate || is_too_long || is_too_large ? 0 : length;
+}
+
+/* Returns the text as a double-quoted scalar of YAML. Names of files need not be UTF-8: other bytes are taken for
+ * characters of Latin-1. */
 std::string quoted(const std::string &text)
 {
     std::string out = "\"";
-    for (const char c : text) {
-        char code[8];
-        if (c == '"' || c == '\\') out += '\\';
-        if (static_cast<unsigned char>(c) < 0x20) {
-            std::snprintf(code, sizeof code, "\\x%02x", static_cast<unsigned>(c));
+    for (size_t at = 0; at < text.size();) {
+        const size_t length = get_character_length(text, at);
+        if (length == 0) {
+            char code[8];
+            std::snprintf(code, sizeof code, "\\x%02x", static_cast<unsigned>(static_cast<unsigned char>(text[at])));
             out += code;
-        } else {
-            out += c;
+            at++;
+            continue;
         }
+        if (text[at] == '"' || text[at] == '\\') out += '\\';
+        out.append(text, at, length);
+        at += length;
     }
     return out + '"';
 }
