@@ -406,6 +406,89 @@ static void derived_fields_have_no_seam_between_blocks(void **state)
     }
 }
 
+/* Ways in which the second half of the cells loses the field, so that the gradients on the first half change. */
+typedef enum loss { BLOCK_REMOVED, RANK_REMOVED, MESH_REMOVED, FIELD_REMOVED, LOSSES } loss;
+
+/* Sets one half of this rank's cells, as a block of the mesh "m" or as a mesh of its own. u: NULL for no field. */
+static void set_half(insitu_session *session, loss kind, int half, const session_input *in, const vector_field *u)
+{
+    const bool is_block = kind == BLOCK_REMOVED || kind == RANK_REMOVED;
+    const char *name = half ? "n" : "m";
+    if (is_block)
+        assert_int_equal(insitu_set_block(session, "m", half, &in->mesh), INSITU_OK);
+    else
+        assert_int_equal(insitu_set_mesh(session, name, &in->mesh), INSITU_OK);
+    if (!u) return;
+    if (is_block)
+        assert_int_equal(insitu_set_block_field(session, "m", half, &u->field), INSITU_OK);
+    else
+        assert_int_equal(insitu_set_field(session, name, &u->field), INSITU_OK);
+}
+
+static void remove_second_half(insitu_session *session, loss kind, const session_input *in)
+{
+    if (kind == BLOCK_REMOVED) assert_int_equal(insitu_set_block(session, "m", 1, NULL), INSITU_OK);
+    if (kind == RANK_REMOVED && own_rank == rank_count - 1)
+        assert_int_equal(insitu_set_mesh(session, "m", NULL), INSITU_OK);
+    if (kind == MESH_REMOVED) assert_int_equal(insitu_set_mesh(session, "n", NULL), INSITU_OK);
+    if (kind == FIELD_REMOVED) set_half(session, kind, 1, in, NULL);
+}
+
+/* Sets what is left after remove_second_half() in a session that has never had more. */
+static void set_remaining(insitu_session *session, loss kind, const session_input halves[2], const vector_field u[2])
+{
+    const bool has_second = kind == RANK_REMOVED || kind == FIELD_REMOVED;
+    if (kind == RANK_REMOVED && own_rank == rank_count - 1) return;
+    set_half(session, kind, 0, &halves[0], &u[0]);
+    if (has_second) set_half(session, kind, 1, &halves[1], kind == FIELD_REMOVED ? NULL : &u[1]);
+}
+
+/* Returns whether this rank's parts of the mesh "m" have bit-identical values of a derived field in two sessions. */
+static bool have_same_derived_values(const insitu_session *a, const insitu_session *b, const char *name)
+{
+    const session_parts x = session_find_parts(&a->meshes, "m"), y = session_find_parts(&b->meshes, "m");
+    bool are_same = x.count == y.count;
+    for (int i = 0; i < x.count && are_same; i++) {
+        const session_field *of_a = &x.items[i]->fields[session_find_field(x.items[i], name)];
+        const session_field *of_b = &y.items[i]->fields[session_find_field(y.items[i], name)];
+        are_same =
+            of_a->copy_bytes == of_b->copy_bytes && memcmp(of_a->copy, of_b->copy, (size_t)of_a->copy_bytes) == 0;
+    }
+    return are_same;
+}
+
+/* Checks that gradients at shared vertices are computed again if cells on their other side are removed, on this rank or
+ * another, or if these cells' mesh loses the field. They must be those of a new session without these cells. */
+static void gradients_forget_removed_neighbours(void **state)
+{
+    (void)state;
+    const char *const scene = SCENE("q: {q_criterion: u}", "q");
+    session_input halves[2] = {{.side = 0}};
+    vector_field u[2];
+    for (int i = 0; i < 2; i++) {
+        input_create(&halves[i], TEST_MIXED, SIDE, TEST_RANDOM, 2 * own_rank + i, 2 * rank_count);
+        make_vector(&halves[i].part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &u[i]);
+    }
+    for (loss kind = 0; kind < LOSSES; kind++) {
+        insitu_session *old = NULL, *new = NULL;
+        if (kind == RANK_REMOVED && rank_count == 1) continue; /* no cells would be left */
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &old), INSITU_OK);
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &new), INSITU_OK);
+        for (int i = 0; i < 2; i++) set_half(old, kind, i, &halves[i], &u[i]);
+        everywhere(insitu_step(old, 0, 0) == INSITU_OK);
+        remove_second_half(old, kind, &halves[1]);
+        set_remaining(new, kind, halves, u);
+        everywhere(insitu_step(old, 1, 0) == INSITU_OK && insitu_step(new, 1, 0) == INSITU_OK);
+        everywhere(have_same_derived_values(old, new, "q"));
+        insitu_destroy(&old);
+        insitu_destroy(&new);
+    }
+    for (int i = 0; i < 2; i++) {
+        free(u[i].values);
+        input_free(&halves[i]);
+    }
+}
+
 /* ---- shells, cells and corners ----------------------------------------------------------------------------------- */
 
 enum { SHEET = 4 };
@@ -688,6 +771,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(expressions_match_c_arithmetic),
         cmocka_unit_test(derived_fields_do_not_depend_on_the_partition),
         cmocka_unit_test(derived_fields_have_no_seam_between_blocks),
+        cmocka_unit_test(gradients_forget_removed_neighbours),
         cmocka_unit_test(gradients_of_shells_are_tangential),
         cmocka_unit_test(velocities_at_cells_and_corners_are_supported),
         cmocka_unit_test(unchanged_derived_fields_are_not_recomputed),

@@ -166,6 +166,20 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                : NULL;
 }
 
+/* Adds to the hash when the positions of vertices last changed on any rank, over all meshes whose gradients are
+ * averaged with those of this mesh. It changes if a part with cells at a shared vertex is removed. The hash of the
+ * remaining part's own data would not change then. */
+static void hash_positions_of_mesh_group(const derive_work *w, const session_catalogue_mesh *mesh, uint64_t *hash)
+{
+    const session_mesh_group *mesh_group = session_find_mesh_group(
+        w->basis->catalogue, session_find_group_name_of_mesh(mesh, w->derived->mesh_group_name));
+    for (int i = 0; mesh_group && i < mesh_group->count; i++) {
+        const session_catalogue_mesh *other = mesh_group->meshes[i];
+        if (find_derived_field_of_mesh(w, other))
+            session_hash_bytes(hash, &other->positions_hash, sizeof other->positions_hash);
+    }
+}
+
 /* Returns a hash of all data that determine the derived values on one of this rank's parts. */
 static uint64_t hash_versions_of_inputs(const derive_work *w, const session_catalogue_mesh *mesh,
                                         const session_mesh *part)
@@ -173,8 +187,7 @@ static uint64_t hash_versions_of_inputs(const derive_work *w, const session_cata
     uint64_t hash = SESSION_HASH_BEGIN;
     session_hash_bytes(&hash, &part->cells_stamp, sizeof part->cells_stamp);
     session_hash_bytes(&hash, &mesh->has_shells_alone, sizeof mesh->has_shells_alone);
-    if (w->derived->kind != SCENE_EXPRESSION)
-        session_hash_bytes(&hash, &part->coordinates_stamp, sizeof part->coordinates_stamp);
+    if (w->derived->kind != SCENE_EXPRESSION) hash_positions_of_mesh_group(w, mesh, &hash);
     for (int k = 0; k < w->derived->input_count; k++) {
         const int index = session_find_field(part, w->derived->inputs[k].name);
         const int count = index < 0 ? 0 : part->fields[index].given.component_count;
