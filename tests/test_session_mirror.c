@@ -309,6 +309,53 @@ static void levels_draw_their_images(void **state)
     expect_same(&pictures[0], &pictures[1], "levels of refinement");
 }
 
+/* Returns whether the mirror image of each of this rank's blocks has the source's current flags of covered cells. */
+static bool have_images_current_covers(const insitu_session *session)
+{
+    const session_parts parts = session_find_parts(&session->meshes, "m");
+    bool are_current = true;
+    for (int i = 0; i < parts.count; i++) {
+        const session_mesh *source = parts.items[i]->source;
+        are_current = are_current && (!source || parts.items[i]->given.ghosts.data == source->covered);
+    }
+    return are_current;
+}
+
+/* Checks that mirror images follow the covered cells of blocks that are not set again themselves: another block is set
+ * again with the same cells, at another place, and removed. The image borrows the array of covered cells, which must
+ * not be freed. */
+static void covered_cells_of_images_follow_changes(void **state)
+{
+    (void)state;
+    static const char scene[] = "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: f}, edges: {}}}]")
+        LAYERS("b", "[{isosurface: {field: f, values: [0.1]}}]");
+    static const char mirrored[] = "meshes: {m: {mirror: x}}\n";
+    double values[2][125];
+    insitu_lattice l[2];
+    insitu_mesh mesh[2];
+    insitu_field f[2];
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, mirrored, scene);
+    for (int cycle = 0; cycle < 4; cycle++) {
+        insitu_session *fresh = open_session_from_texts(MPI_COMM_WORLD, mirrored, scene);
+        for (int i = 0; i < 2; i++) {
+            const bool is_removed = i && cycle == 3;
+            make_level(i, false, values[i], &l[i], &mesh[i], &f[i]);
+            if (i && cycle == 2) l[i].first[0] = FINE;
+            if (i || cycle == 0)
+                everywhere(insitu_set_block(session, "m", i, is_removed ? NULL : &mesh[i]) == INSITU_OK &&
+                           (is_removed || insitu_set_block_field(session, "m", i, &f[i]) == INSITU_OK));
+            if (is_removed) continue;
+            everywhere(insitu_set_block(fresh, "m", i, &mesh[i]) == INSITU_OK &&
+                       insitu_set_block_field(fresh, "m", i, &f[i]) == INSITU_OK);
+        }
+        drawn a = step_and_take_pictures(session, cycle), b = step_and_take_pictures(fresh, cycle);
+        everywhere(have_images_current_covers(session));
+        expect_same(&a, &b, "covered cells");
+        insitu_destroy(&fresh);
+    }
+    insitu_destroy(&session);
+}
+
 /* ---- partitions and derived fields ------------------------------------------------------------------------------- */
 
 static void any_partition_draws_one_picture(void **state)
@@ -627,6 +674,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(planes_and_lattices_draw_their_images),
         cmocka_unit_test(blocks_draw_their_images),
         cmocka_unit_test(levels_draw_their_images),
+        cmocka_unit_test(covered_cells_of_images_follow_changes),
         cmocka_unit_test(any_partition_draws_one_picture),
         cmocka_unit_test(derived_fields_are_those_of_the_source),
         cmocka_unit_test(mirrored_images_follow_changes),

@@ -393,9 +393,14 @@ static bool update_covered_cells_of_block(const cover_search *s, session_meshes 
     if (has_cuts) report_partly_covered_cells(s, mesh, covered);
     const bool is_same =
         !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
-    if (!is_same) session_drop_cell_data(meshes, mesh);
-    base_free(mesh->covered);
-    mesh->covered = covered;
+    if (is_same) {
+        /* the old array is kept, because mirror images point to it until the block's cells change */
+        base_free(covered);
+    } else {
+        session_drop_cell_data(meshes, mesh);
+        base_free(mesh->covered);
+        mesh->covered = covered;
+    }
     session_select_grid_arrays(mesh);
     if (mesh->misfit.exists) mesh->is_check_stale = true;
     return true;
