@@ -431,6 +431,70 @@ static void derived_fields_are_those_of_the_source(void **state)
     input_free(&in);
 }
 
+typedef enum copied_cells { INDEXED, FILLED, OF_HIGHER_ORDER, COPIED_CELLS } copied_cells;
+
+/* Sets a mesh with a field of its cells whose values the library copies: because they have an index, because a fill
+ * function computes them, or because cells of higher order are split into pieces. */
+static void set_copied_cells(insitu_session *session, copied_cells kind, const insitu_mesh *mesh, double *values,
+                             int32_t *index, filled_values *filled)
+{
+    insitu_field field;
+    for (int64_t i = 0; i < mesh->cell_count; i++) {
+        values[i] = sin((double)(7 * i + own_rank));
+        index[i] = (int32_t)(mesh->cell_count - 1 - i);
+    }
+    *filled = (filled_values){{values, INSITU_FLOAT64, 0}, mesh->cell_count, 0};
+    insitu_field_defaults(&field);
+    field.name = "c";
+    field.centring = INSITU_CELL;
+    if (kind == INDEXED) field.index = (insitu_array){index, INSITU_INT32, 0};
+    if (kind == FILLED) {
+        field.fill = copy_filled_values;
+        field.fill_data = filled;
+    } else {
+        field.count = mesh->cell_count;
+        field.values = filled->values;
+    }
+    everywhere(insitu_set_mesh(session, "m", mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+}
+
+/* Checks that gradients of cell values that the library copies are those of the mesh without its mirror images. The
+ * means at vertices, from which they are computed, read the copies on the images, too. */
+static void gradients_of_copied_cell_values_are_those_of_the_source(void **state)
+{
+    (void)state;
+    static const char scene[] = "fields: {g: {gradient: c, component: x}}\n"
+                                "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: g}}}]");
+    session_input in;
+    order_mesh order;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    order_mesh_create(&order_kinds[1], 2, 0.1, test_wave_field, own_rank, rank_count, &order);
+    for (copied_cells kind = 0; kind < COPIED_CELLS; kind++) {
+        const insitu_mesh *mesh = kind == OF_HIGHER_ORDER ? &order.mesh : &in.mesh;
+        double *values = test_calloc((size_t)mesh->cell_count + 1, sizeof *values);
+        int32_t *index = test_calloc((size_t)mesh->cell_count + 1, sizeof *index);
+        filled_values filled;
+        const session_field *of_g[2];
+        insitu_session *sessions[2];
+        for (int i = 0; i < 2; i++) {
+            sessions[i] = open_session_from_texts(MPI_COMM_WORLD, i ? "" : mirrors[0].text, scene);
+            set_copied_cells(sessions[i], kind, mesh, values, index, &filled);
+            drawn pictures = step_and_take_pictures(sessions[i], 0);
+            free_picture_set(&pictures);
+            const session_mesh *part = session_find_mesh(&sessions[i]->meshes, "m");
+            of_g[i] = &part->fields[session_find_field(part, "g")];
+        }
+        everywhere(of_g[0]->copy_bytes == of_g[1]->copy_bytes &&
+                   memcmp(of_g[0]->copy, of_g[1]->copy, (size_t)of_g[0]->copy_bytes) == 0);
+        for (int i = 0; i < 2; i++) insitu_destroy(&sessions[i]);
+        test_free(values);
+        test_free(index);
+    }
+    order_mesh_free(&order);
+    input_free(&in);
+}
+
 /* ---- steps ------------------------------------------------------------------------------------------------------- */
 
 /* Makes a step of the mirrored session, and checks that it draws the same pictures as the session `blocks`, which
@@ -677,6 +741,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(covered_cells_of_images_follow_changes),
         cmocka_unit_test(any_partition_draws_one_picture),
         cmocka_unit_test(derived_fields_are_those_of_the_source),
+        cmocka_unit_test(gradients_of_copied_cell_values_are_those_of_the_source),
         cmocka_unit_test(mirrored_images_follow_changes),
         cmocka_unit_test(edits_of_the_scene_mirror_and_unmirror),
         cmocka_unit_test(errors_name_the_source_mesh),

@@ -59,12 +59,14 @@ uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle
     return add_required_field_bits(scene, bits);
 }
 
+/* Mirror images are included: they take the derived values of their sources, but averages of input values at vertices
+ * include their cells. */
 void session_mark_source_fields(const scene *scene, uint64_t needed, const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) mesh->fields[f].is_source = false;
-        for (int i = 0; i < scene->derived_count && !mesh->source; i++) {
+        for (int i = 0; i < scene->derived_count; i++) {
             if (!(needed >> i & 1) || session_find_field(mesh, scene->derived[i].name) < 0) continue;
             for (int k = 0; k < scene->derived[i].input_count; k++) {
                 const int source = session_find_field(mesh, scene->derived[i].inputs[k].name);
