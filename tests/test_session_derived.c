@@ -406,6 +406,50 @@ static void derived_fields_have_no_seam_between_blocks(void **state)
     }
 }
 
+/* Returns the largest difference of a derived field on one mesh in two sessions. */
+static double compare_derived(const insitu_session *a, const insitu_session *b, const char *mesh, const char *name)
+{
+    const session_mesh *of_a = session_find_mesh(&a->meshes, mesh), *of_b = session_find_mesh(&b->meshes, mesh);
+    const grid_field x = session_get_caller_values(of_a, session_find_field(of_a, name), 0);
+    const grid_field y = session_get_caller_values(of_b, session_find_field(of_b, name), 0);
+    double worst = 0;
+    for (int64_t v = 0; v < of_a->cells.vertex_count; v++)
+        worst = test_larger_error(worst, fabs(grid_field_value(&x, v) - grid_field_value(&y, v)));
+    return worst;
+}
+
+/* Checks that gradients use the cells on both sides of the border between two meshes even if the positions of common
+ * vertices differ in their last bits. */
+static void gradients_merge_vertices_of_meshes_that_differ_in_last_bits(void **state)
+{
+    (void)state;
+    static const char *const meshes[] = {"m", "n"};
+    session_input halves[2] = {{.side = 0}};
+    vector_field u[2];
+    insitu_session *sessions[2];
+    for (int i = 0; i < 2; i++) {
+        input_create(&halves[i], TEST_MIXED, SIDE, TEST_BLOCK, 2 * own_rank + i, 2 * rank_count);
+        make_vector(&halves[i].part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &u[i]);
+    }
+    for (int moved = 0; moved < 2; moved++) {
+        for (int64_t i = 0; i < 3 * halves[1].part.vertex_count && moved; i++)
+            halves[1].part.coordinates[i] *= 1 + 0x1p-50;
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &sessions[moved]),
+                         INSITU_OK);
+        for (int i = 0; i < 2; i++) {
+            assert_int_equal(insitu_set_mesh(sessions[moved], meshes[i], &halves[i].mesh), INSITU_OK);
+            assert_int_equal(insitu_set_field(sessions[moved], meshes[i], &u[i].field), INSITU_OK);
+        }
+        everywhere(insitu_step(sessions[moved], 0, 0) == INSITU_OK);
+    }
+    for (int i = 0; i < 2; i++) everywhere(compare_derived(sessions[0], sessions[1], meshes[i], "q") < 1e-9);
+    for (int i = 0; i < 2; i++) {
+        insitu_destroy(&sessions[i]);
+        free(u[i].values);
+        input_free(&halves[i]);
+    }
+}
+
 /* Ways in which the second half of the cells loses the field, so that the gradients on the first half change. */
 typedef enum loss { BLOCK_REMOVED, RANK_REMOVED, MESH_REMOVED, FIELD_REMOVED, LOSSES } loss;
 
@@ -771,6 +815,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(expressions_match_c_arithmetic),
         cmocka_unit_test(derived_fields_do_not_depend_on_the_partition),
         cmocka_unit_test(derived_fields_have_no_seam_between_blocks),
+        cmocka_unit_test(gradients_merge_vertices_of_meshes_that_differ_in_last_bits),
         cmocka_unit_test(gradients_forget_removed_neighbours),
         cmocka_unit_test(gradients_of_shells_are_tangential),
         cmocka_unit_test(velocities_at_cells_and_corners_are_supported),

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "session.h"
+#include "session_scalars.h"
 #include "test_effort.h"
 #include "test_session_fixture.h"
 
@@ -677,6 +678,91 @@ static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
     }
 }
 
+/* ---- gradients across levels ---------------------------------------------------------------------------------------
+ */
+
+enum { THIRDS = 6 };
+
+/* Sets a coarse block of 4^3 cells on the first rank and, in its middle, a block of cells of a third of their size on
+ * the last rank. `spacing`: size of the coarse cells. */
+static void set_blocks_of_thirds(insitu_session *session, double spacing, double values[2][THIRDS * THIRDS * THIRDS])
+{
+    for (int fine = 0; fine < 2; fine++) {
+        const int of = fine ? 3 : 1, side = fine ? THIRDS : 4, first = fine ? 3 : 0;
+        if (own_rank != (fine ? rank_count - 1 : 0)) continue;
+        insitu_lattice lattice = {.cells = {side, side, side}};
+        for (int axis = 0; axis < 3; axis++) {
+            lattice.spacing[axis] = spacing / of;
+            lattice.first[axis] = first;
+            lattice.refinement[axis] = of;
+        }
+        for (int i = 0; i < side * side * side; i++) {
+            const double x = (first + i % side + 0.5) / of, y = (first + i / side % side + 0.5) / of;
+            values[fine][i] = 0.5 + 0.5 * sin(0.75 * x + 1) * cos(0.5 * y);
+            values[fine][i] *= cos(0.6 * (first + i / side / side + 0.5) / of + 0.3);
+        }
+        insitu_mesh mesh;
+        insitu_field field;
+        insitu_mesh_defaults(&mesh);
+        insitu_field_defaults(&field);
+        mesh.lattice = &lattice;
+        mesh.cell_count = side * side * side;
+        mesh.vertex_count = (side + 1) * (side + 1) * (side + 1);
+        field.name = "f";
+        field.centring = INSITU_CELL;
+        field.count = mesh.cell_count;
+        field.values = (insitu_array){values[fine], INSITU_FLOAT64, 0};
+        assert_int_equal(insitu_set_block(session, "m", fine, &mesh), INSITU_OK);
+        assert_int_equal(insitu_set_block_field(session, "m", fine, &field), INSITU_OK);
+    }
+}
+
+/* Returns the largest difference, over this rank's blocks, between the derived field "g" of one session and `scale`
+ * times that of another. */
+static double compare_gradients(const insitu_session *a, const insitu_session *b, double scale)
+{
+    const session_parts parts = session_find_parts(&a->meshes, "m");
+    double worst = 0;
+    for (int i = 0; i < parts.count; i++) {
+        const session_mesh *of_a = parts.items[i], *of_b = session_find_block(&b->meshes, "m", of_a->block);
+        const grid_field x = session_get_caller_values(of_a, session_find_field(of_a, "g"), 0);
+        const grid_field y = session_get_caller_values(of_b, session_find_field(of_b, "g"), 0);
+        for (int64_t v = 0; v < of_a->cells.vertex_count; v++) {
+            const double value = grid_field_value(&x, v), other = scale * grid_field_value(&y, v);
+            if (isnan(value) && isnan(other)) continue; /* a vertex of covered cells only */
+            worst = test_larger_error(worst, fabs(value - other));
+        }
+    }
+    return worst;
+}
+
+/* Checks derived gradients and smooth normals if the vertices that the levels share differ in their last bits. With a
+ * spacing of 3 they are bitwise equal, with 0.9 they are not. The results must be the same except for their scale. */
+static void gradients_merge_vertices_that_differ_in_last_bits(void **state)
+{
+    (void)state;
+    const char *scene = write_scene(
+        "fields: {g: {gradient: f, component: magnitude}}\nstatistics: [{field: g, path: g.csv}]\nimages:\n"
+        "  - name: a\n    size: [60, 60]\n    camera: {automatic: {direction: [1, 0.8, 1.2]}}\n    layers:\n"
+        "      - isosurface: {field: f, values: [0.6], normals: vertex}\n    outputs: [{path: a.exr}]\n");
+    static const double spacings[2] = {3, 0.9};
+    double values[2][2][THIRDS * THIRDS * THIRDS];
+    insitu_session *sessions[2];
+    caught_picture pictures[2];
+    for (int i = 0; i < 2; i++) {
+        sessions[i] = open_session(MPI_COMM_WORLD, scene);
+        set_blocks_of_thirds(sessions[i], spacings[i], values[i]);
+        pictures[i] = step_and_take_picture(sessions[i], 0);
+    }
+    everywhere(compare_gradients(sessions[0], sessions[1], spacings[1] / spacings[0]) < 1e-12);
+    everywhere(largest_colour_difference(&pictures[0], &pictures[1]) < 1e-3);
+    everywhere(own_rank != 0 || count_visible_pixels(&pictures[0]) > 100);
+    for (int i = 0; i < 2; i++) {
+        free_caught(&pictures[i]);
+        insitu_destroy(&sessions[i]);
+    }
+}
+
 static int set_up_test_group(void **state)
 {
     (void)state;
@@ -690,6 +776,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(levels_are_added_and_removed),
                                        cmocka_unit_test(blocks_adjacent_to_a_change_are_kept),
                                        cmocka_unit_test(blocks_that_do_not_fit_are_reported),
-                                       cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell)};
+                                       cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell),
+                                       cmocka_unit_test(gradients_merge_vertices_that_differ_in_last_bits)};
     return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

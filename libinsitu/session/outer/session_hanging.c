@@ -198,6 +198,14 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
     return status;
 }
 
+const session_border *session_find_border_of_part(const session_mesh_group *mesh_group,
+                                                  const session_mesh_group_parts *parts, const session_mesh *part,
+                                                  int *at)
+{
+    while (parts->items[*at] != part) (*at)++;
+    return session_merges_close_vertices(mesh_group) ? &mesh_group->hanging.borders[*at] : NULL;
+}
+
 /* ---- candidates: vertices that may hang on a face ---------------------------------------------------------------- */
 
 static bool list_candidates(hanging_search *s)

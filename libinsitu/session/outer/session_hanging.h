@@ -41,6 +41,13 @@ bool session_merges_close_vertices(const session_mesh_group *mesh_group);
 insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                      const session_team *team, base_error *error);
 
+/* Returns the border of a part of the mesh group's meshes; NULL if vertices of the group are compared bitwise. *at: an
+ * index in `parts`, not after the part, which is increased to that of the part; 0 at the first call. The borders must
+ * be up to date (session_update_borders()). */
+const session_border *session_find_border_of_part(const session_mesh_group *mesh_group,
+                                                  const session_mesh_group_parts *parts, const session_mesh *part,
+                                                  int *at);
+
 /* Computes the mesh group's hanging vertices, unless they are up to date. The group's borders must be up to date
  * (session_update_borders()). Collective; all ranks return the same status. */
 insitu_status session_update_hanging_vertices(const session_hanging_basis *basis, const session_team *team,

@@ -9,6 +9,7 @@
 #include "session_coarse_face.h"
 #include "session_cell_faces.h"
 #include "session_exchange.h"
+#include "session_neighbours.h"
 #include "vector3.h"
 
 enum { CORNER_WORDS = 4 };
@@ -206,4 +207,37 @@ insitu_status session_find_coincident_vertices(session_mesh_group *mesh_group, c
     base_free(s.corners);
     base_free(s.vertices);
     return status;
+}
+
+/* ---- keys -------------------------------------------------------------------------------------------------------- */
+
+static session_key make_key_of_point(const double position[3])
+{
+    session_key key;
+    for (int axis = 0; axis < 3; axis++) {
+        const double unsigned_zero = position[axis] + 0.0;
+        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
+    }
+    return key;
+}
+
+/* Returns the entry of a vertex in the border's sorted list of twins; NULL if the vertex is no twin. */
+static const session_twin *find_twin(const session_border *border, int64_t vertex)
+{
+    int64_t first = 0, end = border->twin_count;
+    while (first < end) {
+        const int64_t middle = first + (end - first) / 2;
+        if (border->twins[middle].vertex < vertex)
+            first = middle + 1;
+        else
+            end = middle;
+    }
+    return first < border->twin_count && border->twins[first].vertex == vertex ? &border->twins[first] : NULL;
+}
+
+session_key session_merged_vertex_key(const session_mesh *mesh, const session_border *border, int64_t vertex,
+                                      bool by_id)
+{
+    const session_twin *twin = border ? find_twin(border, vertex) : NULL;
+    return twin ? make_key_of_point(twin->position) : session_vertex_key(mesh, vertex, by_id);
 }

@@ -9,6 +9,7 @@
 #define SESSION_TWINS_H
 
 #include "session_catalogue.h"
+#include "session_keys.h"
 #include "session_team.h"
 
 /* Finds the twins of the mesh group's vertices. Its borders (outer faces of parts, session_catalogue.h) and its
@@ -16,5 +17,11 @@
  * parts. Errors that occur only on this rank are stored in *error and not returned. Collective. */
 insitu_status session_find_coincident_vertices(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                                const session_team *team, base_error *error);
+
+/* Returns the key of a vertex of a part of a mesh: for a twin, that of the position that all its twins have in common,
+ * and otherwise session_vertex_key(). border: the part's border, whose twins must be up to date; NULL: vertices are
+ * compared bitwise. by_id: vertices are compared by their global ids; there are no twins then. */
+session_key session_merged_vertex_key(const session_mesh *mesh, const session_border *border, int64_t vertex,
+                                      bool by_id);
 
 #endif

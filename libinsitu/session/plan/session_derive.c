@@ -17,6 +17,7 @@
 #include "session_agree.h"
 #include "session_derived.h"
 #include "session_field_input.h"
+#include "session_hanging.h"
 #include "session_hash.h"
 #include "session_mirrors.h"
 #include "session_recentre.h"
@@ -477,14 +478,17 @@ static int count_scalars_with_gradients(const derive_work *w, const session_mesh
 }
 
 static insitu_status prepare_sums_of_gradients(const derive_work *w, const session_mesh_group *mesh_group,
-                                               session_vertex_sums *sums, base_error *error)
+                                               const session_mesh_group_parts *list, session_vertex_sums *sums,
+                                               base_error *error)
 {
+    int at = 0;
     sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
     if (!sums->parts) return session_fail_for_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
     for (int m = 0; m < mesh_group->count; m++)
         for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
             session_sum_part *part = &sums->parts[sums->part_count++];
             part->mesh = v.part;
+            part->border = session_find_border_of_part(mesh_group, list, v.part, &at);
             part->of_shells = mesh_group->meshes[m]->has_shells_alone;
             list_scalars_with_gradients(w, mesh_group->meshes[m], v.part, part->fields);
             if (!allocate_derived_values(w, v.part, &v.part->fields[v.field_index]))
@@ -495,13 +499,18 @@ static insitu_status prepare_sums_of_gradients(const derive_work *w, const sessi
 
 /* Computes the derived field from gradients on all meshes of a group. Collective. An error of this rank after the last
  * communication is only stored in *error. */
-static insitu_status compute_field_on_mesh_group(const derive_work *w, const session_mesh_group *mesh_group,
+static insitu_status compute_field_on_mesh_group(const derive_work *w, session_mesh_group *mesh_group,
                                                  base_error *error)
 {
+    const session_team *team = w->basis->team;
     session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars_with_gradients(w, mesh_group)};
-    if (!error->status) prepare_sums_of_gradients(w, mesh_group, &sums, error);
-    const insitu_status status =
-        session_compute_vertex_sums(mesh_group->homes, w->basis->team, w->basis->extent, &sums, error);
+    session_mesh_group_parts list;
+    insitu_status status = INSITU_OK;
+    if (!session_list_mesh_group_parts(mesh_group, w->basis->meshes, &list))
+        session_fail_for_memory(error, w->basis->meshes->count * 8LL, "gradients at vertices");
+    if (session_merges_close_vertices(mesh_group)) status = session_update_borders(mesh_group, &list, team, error);
+    if (!status && !error->status) prepare_sums_of_gradients(w, mesh_group, &list, &sums, error);
+    if (!status) status = session_compute_vertex_sums(mesh_group->homes, team, w->basis->extent, &sums, error);
     int at = 0;
     for (int m = 0; m < mesh_group->count && !status && !error->status; m++)
         for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
@@ -509,6 +518,7 @@ static insitu_status compute_field_on_mesh_group(const derive_work *w, const ses
             mark_derived_values_changed(w, mesh_group->meshes[m], v.part, v.field_index);
         }
     session_vertex_sums_free(&sums);
+    session_mesh_group_parts_free(&list);
     return status;
 }
 
@@ -528,7 +538,7 @@ static insitu_status compute_field_on_mesh_groups(const derive_work *w, base_err
     insitu_status status = INSITU_OK;
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const session_mesh_group *mesh_group =
+        session_mesh_group *mesh_group =
             find_derived_field_of_mesh(w, mesh)
                 ? session_find_mesh_group(catalogue, session_find_group_name_of_mesh(mesh, w->derived->mesh_group_name))
                 : NULL;

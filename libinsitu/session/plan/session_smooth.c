@@ -8,8 +8,9 @@
 #include "memory.h"
 #include "render.h"
 #include "session_agree.h"
-#include "session_neighbours.h"
+#include "session_hanging.h"
 #include "session_scalars.h"
+#include "session_twins.h"
 #include "session_vertex_sums.h"
 
 /* A field on a mesh, or on a mesh group, that needs gradients at vertices. */
@@ -32,6 +33,10 @@ typedef struct smooth_items {
 
 /* This rank's data while the gradients of one field are computed. */
 typedef struct smooth_work {
+    /* the mesh group over which the values are averaged, and this rank's parts of its meshes; NULL: the values are not
+     * averaged, and vertices are compared bitwise */
+    session_mesh_group *mesh_group;
+    session_mesh_group_parts list;
     session_scalar **scalars; /* scalar of each part */
     mmbvh_selection *crossed; /* for each part, the cells that the isosurface crosses */
     session_vertex_sums sums;
@@ -154,7 +159,7 @@ static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_s
         const session_sum_part *part = &sums->parts[i];
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++)
             if (part->key_indices[v] == 0) {
-                const session_key key = session_vertex_key(part->mesh, v, item->mesh->has_ids);
+                const session_key key = session_merged_vertex_key(part->mesh, part->border, v, item->mesh->has_ids);
                 session_keys_add(&sums->keys, &key);
             }
     }
@@ -190,7 +195,7 @@ static insitu_status create_gradient_work(const smooth_item *item, const session
     const session_parts parts = session_find_parts(meshes, item->mesh->name);
     const size_t capacity = (size_t)parts.count + 1;
     session_vertex_sums *sums = &work->sums;
-    *work = (smooth_work){.sums = {.by_id = item->mesh->has_ids, .field_count = 1}};
+    int at = 0;
     sums->parts = base_calloc(capacity, sizeof *sums->parts);
     work->scalars = base_calloc(capacity, sizeof *work->scalars);
     work->crossed = base_calloc(capacity, sizeof *work->crossed);
@@ -202,9 +207,26 @@ static insitu_status create_gradient_work(const smooth_item *item, const session
         if (!scalar) continue;
         work->scalars[sums->part_count] = scalar;
         sums->parts[sums->part_count].mesh = part;
+        if (work->mesh_group)
+            sums->parts[sums->part_count].border =
+                session_find_border_of_part(work->mesh_group, &work->list, part, &at);
         sums->parts[sums->part_count++].fields[0] = session_get_scalar_values(part, scalar);
     }
     return find_keys_of_crossed_cells(item, threads, work, error);
+}
+
+/* Finds the mesh group over which the values are averaged, and its vertices that are equal except for rounding.
+ * Collective; all ranks return the same status. */
+static insitu_status find_twins_of_field(const smooth_item *item, const session_catalogue *catalogue,
+                                         const session_meshes *meshes, const session_team *team, smooth_work *work,
+                                         base_error *error)
+{
+    work->mesh_group = session_find_mesh_group(catalogue, item->mesh_group_name);
+    if (!work->mesh_group) return INSITU_OK;
+    if (!session_list_mesh_group_parts(work->mesh_group, meshes, &work->list))
+        session_fail_for_memory(error, meshes->count * 8LL, "gradients at vertices");
+    if (!session_merges_close_vertices(work->mesh_group)) return INSITU_OK;
+    return session_update_borders(work->mesh_group, &work->list, team, error);
 }
 
 static void free_gradient_work(smooth_work *work)
@@ -212,6 +234,7 @@ static void free_gradient_work(smooth_work *work)
     for (int i = 0; i < work->sums.part_count && work->crossed; i++) mmbvh_selection_free(&work->crossed[i]);
     base_free(work->crossed);
     base_free(work->scalars);
+    session_mesh_group_parts_free(&work->list);
     session_vertex_sums_free(&work->sums);
 }
 
@@ -259,13 +282,14 @@ static bool store_gradients(const session_vertex_sums *sums, session_sum_part *p
     return true;
 }
 
-static insitu_status compute_gradients_of_field(const smooth_item *item, const session_meshes *meshes,
-                                                const session_team *team, const session_extent *extent,
-                                                base_error *error)
+static insitu_status compute_gradients_of_field(const smooth_item *item, const session_catalogue *catalogue,
+                                                const session_meshes *meshes, const session_team *team,
+                                                const session_extent *extent, base_error *error)
 {
-    smooth_work work = {0};
-    if (!error->status) create_gradient_work(item, meshes, team->threads, &work, error);
-    const insitu_status status = session_compute_vertex_sums(&item->mesh->homes, team, extent, &work.sums, error);
+    smooth_work work = {.sums = {.by_id = item->mesh->has_ids, .field_count = 1}};
+    insitu_status status = find_twins_of_field(item, catalogue, meshes, team, &work, error);
+    if (!status && !error->status) create_gradient_work(item, meshes, team->threads, &work, error);
+    if (!status) status = session_compute_vertex_sums(&item->mesh->homes, team, extent, &work.sums, error);
     for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
         if (!store_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
             session_fail_for_memory(error, work.sums.own_count * 12, "gradients at vertices");
@@ -283,7 +307,7 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
         session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)
-        status = compute_gradients_of_field(&items.items[i], meshes, team, extent, error);
+        status = compute_gradients_of_field(&items.items[i], catalogue, meshes, team, extent, error);
     items_free(&items);
     return status;
 }

@@ -3,27 +3,15 @@
 #include <string.h>
 
 #include "memory.h"
-#include "session_neighbours.h"
+#include "session_twins.h"
 
 typedef session_vertex_groups_basis groups_basis;
 
 /* ---- groups of equal vertices ------------------------------------------------------------------------------------ */
 
-static session_key make_key_of_point(const double position[3])
-{
-    session_key key;
-    for (int axis = 0; axis < 3; axis++) {
-        const double unsigned_zero = position[axis] + 0.0;
-        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
-    }
-    return key;
-}
-
 /* Assigns the vertices of a part's drawn cells to groups of equal vertices, and adds to corner_starts[g + 1] the number
- * of corners of the part's drawn cells that are in group g. A twin is a vertex that is equal to another vertex except
- * for rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i for the i-th twin. If
- * vertices are compared by id, one_vertex receives the index of one vertex of each group among the vertices of all
- * parts; otherwise it is NULL. */
+ * of corners of the part's drawn cells that are in group g. If vertices are compared by id, one_vertex receives the
+ * index of one vertex of each group among the vertices of all parts; otherwise it is NULL. */
 static void group_vertices_of_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
@@ -31,16 +19,13 @@ static void group_vertices_of_part(const groups_basis *basis, int part, session_
     const grid *g = &mesh->cells;
     int64_t *of_vertex = out->group_of_vertex + out->first_vertices[part];
     for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
-    for (int64_t i = 0; border && i < border->twin_count; i++) of_vertex[border->twins[i].vertex] = -2 - i;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] < 0) {
-                const int64_t twin = -2 - of_vertex[vertex];
-                const session_key key = twin >= 0 ? make_key_of_point(border->twins[twin].position)
-                                                  : session_vertex_key(mesh, vertex, basis->by_id);
+                const session_key key = session_merged_vertex_key(mesh, border, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
                 if (one_vertex) one_vertex[of_vertex[vertex]] = out->first_vertices[part] + vertex;
             }

@@ -15,8 +15,8 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_neighbours.h"
 #include "session_region.h"
+#include "session_twins.h"
 
 enum { KEY_WORDS = 3 };
 
@@ -51,7 +51,7 @@ static bool assign_keys_to_all_vertices(session_vertex_sums *sums)
         mark_vertices_of_drawn_cells(part);
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             if (part->key_indices[v] < 0) continue;
-            const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+            const session_key key = session_merged_vertex_key(part->mesh, part->border, v, sums->by_id);
             part->key_indices[v] = (int32_t)session_keys_add(&sums->keys, &key);
         }
     }
@@ -107,7 +107,7 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
             if (part->key_indices[v] < 0) continue;
             int64_t number = part->key_indices[v];
             if (!sums->has_all_vertices) {
-                const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+                const session_key key = session_merged_vertex_key(part->mesh, part->border, v, sums->by_id);
                 number = session_keys_find(&sums->keys, &key);
             }
             grid_read_vertex_position(&part->mesh->cells, v, (*out)[number]);
@@ -262,7 +262,7 @@ static void find_key_indices(const session_vertex_sums *sums, session_sum_part *
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             if (is_marked && part->key_indices[v] < 0) continue;
-            const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+            const session_key key = session_merged_vertex_key(part->mesh, part->border, v, sums->by_id);
             const uint64_t bit = session_key_hash(&key) >> 32 & filter->mask;
             const bool may_be = filter->bits[bit / 64] >> bit % 64 & 1;
             part->key_indices[v] = may_be ? (int32_t)session_keys_find(&sums->keys, &key) : -1;

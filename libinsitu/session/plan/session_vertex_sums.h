@@ -1,6 +1,7 @@
 /* Sums the gradients in the cells around each vertex, over the cells of all ranks (scalars/session_gradients.h). Equal
- * vertices have equal keys: their global id or the bits of their coordinates (session_keys.h). For a vertex in the
- * bounding boxes of several ranks, each rank gets the sums of the other ranks and adds them to its own. */
+ * vertices have equal keys: their global id or the bits of their coordinates, which twins have in common
+ * (session_merged_vertex_key()). For a vertex in the bounding boxes of several ranks, each rank gets the sums of the
+ * other ranks and adds them to its own. */
 #ifndef SESSION_VERTEX_SUMS_H
 #define SESSION_VERTEX_SUMS_H
 
@@ -12,6 +13,8 @@
 /* One of this rank's parts of the meshes, with the keys of its vertices. */
 typedef struct session_sum_part {
     session_mesh *mesh;
+    /* border with the twins of the part's vertices (session_twins.h); NULL: vertices are compared bitwise */
+    const session_border *border;
     bool of_shells;                       /* true: gradients are summed over shells; false: over cells with a volume */
     grid_field fields[SESSION_GRADIENTS]; /* the scalars whose gradients are summed */
     /* for each vertex, the index of its key in session_vertex_sums.keys; -1: no gradient is computed at the vertex */
