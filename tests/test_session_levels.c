@@ -681,26 +681,51 @@ static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
 /* ---- gradients across levels ---------------------------------------------------------------------------------------
  */
 
-enum { THIRDS = 6 };
+/* A coarse block of 4^3 cells on the first rank and, in its middle, a fine block on the last rank. */
+typedef struct two_levels {
+    int ratio;
+    double spacing; /* size of the coarse cells */
+    bool is_of_cells;
+    double raise; /* number that is added to the values at hanging vertices */
+} two_levels;
 
-/* Sets a coarse block of 4^3 cells on the first rank and, in its middle, a block of cells of a third of their size on
- * the last rank. `spacing`: size of the coarse cells. */
-static void set_blocks_of_thirds(insitu_session *session, double spacing, double values[2][THIRDS * THIRDS * THIRDS])
+enum { MOST_VALUES = 7 * 7 * 7 };
+
+/* Returns whether the fine block's vertex with these indices lies on the block's border, but is no coarse vertex. */
+static bool is_hanging(const two_levels *l, const int at[3])
+{
+    bool is_on_border = false, is_coarse = true;
+    for (int axis = 0; axis < 3; axis++) {
+        is_on_border = is_on_border || at[axis] == 0 || at[axis] == 2 * l->ratio;
+        is_coarse = is_coarse && at[axis] % l->ratio == 0;
+    }
+    return is_on_border && !is_coarse;
+}
+
+static double compute_two_level_value(const two_levels *l, bool is_fine, const int at[3])
+{
+    const int of = is_fine ? l->ratio : 1, first = is_fine ? l->ratio : 0;
+    double place[3];
+    for (int axis = 0; axis < 3; axis++) place[axis] = (first + at[axis] + (l->is_of_cells ? 0.5 : 0)) / of;
+    const double wave = sin(0.75 * place[0] + 1) * cos(0.5 * place[1]) * cos(0.6 * place[2] + 0.3);
+    return 0.5 + 0.5 * wave + (!l->is_of_cells && is_fine && is_hanging(l, at) ? l->raise : 0);
+}
+
+static void set_two_levels(insitu_session *session, const two_levels *l, double values[2][MOST_VALUES])
 {
     for (int fine = 0; fine < 2; fine++) {
-        const int of = fine ? 3 : 1, side = fine ? THIRDS : 4, first = fine ? 3 : 0;
+        const int of = fine ? l->ratio : 1, side = fine ? 2 * l->ratio : 4;
+        const int wide = l->is_of_cells ? side : side + 1;
         if (own_rank != (fine ? rank_count - 1 : 0)) continue;
         insitu_lattice lattice = {.cells = {side, side, side}};
         for (int axis = 0; axis < 3; axis++) {
-            lattice.spacing[axis] = spacing / of;
-            lattice.first[axis] = first;
+            lattice.spacing[axis] = l->spacing / of;
+            lattice.first[axis] = fine ? l->ratio : 0;
             lattice.refinement[axis] = of;
         }
-        for (int i = 0; i < side * side * side; i++) {
-            const double x = (first + i % side + 0.5) / of, y = (first + i / side % side + 0.5) / of;
-            values[fine][i] = 0.5 + 0.5 * sin(0.75 * x + 1) * cos(0.5 * y);
-            values[fine][i] *= cos(0.6 * (first + i / side / side + 0.5) / of + 0.3);
-        }
+        for (int i = 0; i < wide * wide * wide; i++)
+            values[fine][i] =
+                compute_two_level_value(l, fine, (const int[]){i % wide, i / wide % wide, i / wide / wide});
         insitu_mesh mesh;
         insitu_field field;
         insitu_mesh_defaults(&mesh);
@@ -709,8 +734,8 @@ static void set_blocks_of_thirds(insitu_session *session, double spacing, double
         mesh.cell_count = side * side * side;
         mesh.vertex_count = (side + 1) * (side + 1) * (side + 1);
         field.name = "f";
-        field.centring = INSITU_CELL;
-        field.count = mesh.cell_count;
+        field.centring = l->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
+        field.count = wide * wide * wide;
         field.values = (insitu_array){values[fine], INSITU_FLOAT64, 0};
         assert_int_equal(insitu_set_block(session, "m", fine, &mesh), INSITU_OK);
         assert_int_equal(insitu_set_block_field(session, "m", fine, &field), INSITU_OK);
@@ -736,31 +761,48 @@ static double compare_gradients(const insitu_session *a, const insitu_session *b
     return worst;
 }
 
-/* Checks derived gradients and smooth normals if the vertices that the levels share differ in their last bits. With a
- * spacing of 3 they are bitwise equal, with 0.9 they are not. The results must be the same except for their scale. */
-static void gradients_merge_vertices_that_differ_in_last_bits(void **state)
+static const char gradient_scene[] =
+    "fields: {g: {gradient: f, component: magnitude}}\nstatistics: [{field: g, path: g.csv}]\nimages:\n"
+    "  - name: a\n    size: [60, 60]\n    camera: {automatic: {direction: [1, 0.8, 1.2]}}\n    layers:\n"
+    "      - isosurface: {field: f, values: [0.6], normals: vertex}\n    outputs: [{path: a.exr}]\n";
+
+/* Draws two descriptions of the same levels in two sessions. Checks that the gradients of the second, multiplied by
+ * `scale`, are those of the first, and that both pictures show the same. */
+static void expect_same_gradients(const two_levels levels[2], double scale, double allowed)
 {
-    (void)state;
-    const char *scene = write_scene(
-        "fields: {g: {gradient: f, component: magnitude}}\nstatistics: [{field: g, path: g.csv}]\nimages:\n"
-        "  - name: a\n    size: [60, 60]\n    camera: {automatic: {direction: [1, 0.8, 1.2]}}\n    layers:\n"
-        "      - isosurface: {field: f, values: [0.6], normals: vertex}\n    outputs: [{path: a.exr}]\n");
-    static const double spacings[2] = {3, 0.9};
-    double values[2][2][THIRDS * THIRDS * THIRDS];
+    const char *scene = write_scene(gradient_scene);
+    double values[2][2][MOST_VALUES];
     insitu_session *sessions[2];
     caught_picture pictures[2];
     for (int i = 0; i < 2; i++) {
         sessions[i] = open_session(MPI_COMM_WORLD, scene);
-        set_blocks_of_thirds(sessions[i], spacings[i], values[i]);
+        set_two_levels(sessions[i], &levels[i], values[i]);
         pictures[i] = step_and_take_picture(sessions[i], 0);
     }
-    everywhere(compare_gradients(sessions[0], sessions[1], spacings[1] / spacings[0]) < 1e-12);
+    everywhere(compare_gradients(sessions[0], sessions[1], scale) <= allowed);
     everywhere(largest_colour_difference(&pictures[0], &pictures[1]) < 1e-3);
     everywhere(own_rank != 0 || count_visible_pixels(&pictures[0]) > 100);
     for (int i = 0; i < 2; i++) {
         free_caught(&pictures[i]);
         insitu_destroy(&sessions[i]);
     }
+}
+
+/* Checks derived gradients and smooth normals if the vertices that the levels share differ in their last bits. With a
+ * spacing of 3 they are bitwise equal, with 0.9 they are not. The results must be the same except for their scale. */
+static void gradients_merge_vertices_that_differ_in_last_bits(void **state)
+{
+    (void)state;
+    for (int of_cells = 0; of_cells < 2; of_cells++)
+        expect_same_gradients((const two_levels[]){{3, 3, of_cells, 0}, {3, 0.9, of_cells, 0}}, 0.9 / 3, 1e-12);
+}
+
+/* Checks that the given values at hanging vertices do not matter for gradients. */
+static void gradients_ignore_given_values_at_hanging_vertices(void **state)
+{
+    (void)state;
+    for (int ratio = 2; ratio <= 3; ratio++)
+        expect_same_gradients((const two_levels[]){{ratio, 1, false, 0}, {ratio, 1, false, 7}}, 1, 0);
 }
 
 static int set_up_test_group(void **state)
@@ -777,6 +819,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(blocks_adjacent_to_a_change_are_kept),
                                        cmocka_unit_test(blocks_that_do_not_fit_are_reported),
                                        cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell),
-                                       cmocka_unit_test(gradients_merge_vertices_that_differ_in_last_bits)};
+                                       cmocka_unit_test(gradients_merge_vertices_that_differ_in_last_bits),
+                                       cmocka_unit_test(gradients_ignore_given_values_at_hanging_vertices)};
     return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

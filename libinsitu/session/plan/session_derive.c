@@ -1,6 +1,6 @@
 /* Derived fields are computed one after the other, each after the fields on which it depends. The steps for one derived
  * field are:
- *     cells' values that are needed at vertices  ->  session_recentre()
+ *     cells' values that are needed at vertices, and values at vertices of refined meshes  ->  session_recentre()
  *     an expression:  blocks of vertices or cells, each instruction for a whole block
  *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
  *         (session_vertex_sums.h), over all meshes that share the field, so that blocks show no seam
@@ -88,12 +88,17 @@ static int find_input_component(const scene_field *input, int component_count)
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
 
-/* Returns whether the input's cell values on the mesh must first be converted to vertex values (recentred). */
+/* Returns whether the input's values on the mesh must first be recentred: cell values, if the derived field has vertex
+ * values; and vertex values on a mesh with levels of refinement, if gradients are computed from them, so that hanging
+ * vertices get the values interpolated on coarser faces. */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     const session_catalogue_field *field = find_derived_field_of_mesh(w, mesh),
                                   *from = session_catalogue_find_field(mesh, input->name);
-    return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
+    if (!field || !from || field->centring == INSITU_CELL) return false;
+    const bool is_expression = w->derived->kind == SCENE_EXPRESSION;
+    return (from->centring == INSITU_CELL || !is_expression) &&
+           session_is_recentred(input, from->centring, mesh->is_refined);
 }
 
 static uint64_t find_mesh_group_name(const session_catalogue_mesh *mesh, const scene_field *input)
@@ -101,9 +106,9 @@ static uint64_t find_mesh_group_name(const session_catalogue_mesh *mesh, const s
     return session_find_group_name_of_mesh(mesh, input->mesh_group_name);
 }
 
-/* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
+/* ---- values recentred to vertices -------------------------------------------------------------------------------- */
 
-/* Adds a scalar to this rank's part of a mesh. The scalar will hold the input's cell values converted to vertices. */
+/* Adds a scalar to this rank's part of a mesh. The scalar will hold the input's values recentred to vertices. */
 static bool add_recentred_scalar_to_part(const session_catalogue_mesh *mesh, session_mesh *part,
                                          const scene_field *input, int component)
 {
@@ -222,9 +227,9 @@ static insitu_status find_stale_meshes(derive_work *w, base_error *error)
 
 /* ---- input values and derived values on one part of a mesh ------------------------------------------------------- */
 
-/* Returns the values of a component of an input, at vertices or in cells as the derived field requires. If the input
- * has cell values but the derived field has vertex values, these are the input's values averaged to vertices; otherwise
- * they are the input's own values. component: index, or -1 for the magnitude. */
+/* Returns the values of a component of an input, at vertices or in cells as the derived field requires. These are the
+ * recentred values if is_recentred() holds, and otherwise the input's own values. component: index, or -1 for the
+ * magnitude. */
 static grid_field find_input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                     int input, int component)
 {
