@@ -35,6 +35,17 @@ static const mirror mirrors[] = {
 };
 enum { MIRRORS = sizeof mirrors / sizeof mirrors[0] };
 
+/* Returns whether a coordinate is that of the mirror plane, except for rounding. */
+static bool is_in_plane(const mirror *by, int axis, double place)
+{
+    return fabs(place - by->planes[axis]) < 1e-6;
+}
+
+static double mirror_place(const mirror *by, int axis, double place)
+{
+    return is_in_plane(by, axis, place) ? place : 2 * by->planes[axis] - place;
+}
+
 /* The description of a mirror image, with its own arrays. */
 typedef struct mirror_image {
     void *places[3];
@@ -55,9 +66,9 @@ static void mirror_by_vertex(const insitu_mesh *mesh, int axes, const mirror *by
             double place[3];
             compute_vertex_position(mesh, v, place);
             if (type == INSITU_FLOAT64)
-                ((double *)out->places[axis])[v] = 2 * by->planes[axis] - place[axis];
+                ((double *)out->places[axis])[v] = mirror_place(by, axis, place[axis]);
             else
-                ((float *)out->places[axis])[v] = (float)(2 * by->planes[axis] - place[axis]);
+                ((float *)out->places[axis])[v] = (float)mirror_place(by, axis, place[axis]);
         }
         out->mesh.coordinates[axis] = (insitu_array){out->places[axis], type, 0};
     }
@@ -73,7 +84,7 @@ static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *b
         for (int64_t n = 0; n < count; n++) {
             double place[3];
             compute_vertex_position(mesh, n * stride, place);
-            out->along[axis][n] = axes >> axis & 1 ? 2 * by->planes[axis] - place[axis] : place[axis];
+            out->along[axis][n] = axes >> axis & 1 ? mirror_place(by, axis, place[axis]) : place[axis];
         }
         stride *= count;
         out->lattice.axes[axis] = (insitu_array){out->along[axis], INSITU_FLOAT64, 0};
@@ -90,7 +101,7 @@ static void renumber_vertices(const insitu_mesh *mesh, int axes, const mirror *b
         out->ids[v] = ((const int64_t *)mesh->vertex_ids.data)[v];
         compute_vertex_position(mesh, v, place);
         for (int axis = 0; axis < 3; axis++)
-            if (axes >> axis & 1 && place[axis] != by->planes[axis]) out->ids[v] += (int64_t)1 << (45 + axis);
+            if (axes >> axis & 1 && !is_in_plane(by, axis, place[axis])) out->ids[v] += (int64_t)1 << (45 + axis);
     }
     out->mesh.vertex_ids = (insitu_array){out->ids, INSITU_INT64, 0};
 }
@@ -248,6 +259,56 @@ static void blocks_draw_their_images(void **state)
         }
         expect_same(&pictures[0], &pictures[1], "blocks");
     }
+}
+
+/* ---- planes at decimal numbers ----------------------------------------------------------------------------------- */
+
+/* A mirror plane at 0.3. Neither 0.3 as a float32 number nor 3 * 0.1 is equal to it. */
+static const mirror decimal_mirror = {1, {0.3, 0, 0}, "meshes: {m: {mirror: {x: 0.3}}}\n"};
+
+/* Moves vertices at x = -1 to x = 3 * 0.1, which exceeds 0.3, and all others to larger x. */
+static void move_to_decimal_plane(double *coordinates, int64_t vertex_count)
+{
+    for (int64_t v = 0; v < vertex_count; v++) coordinates[3 * v] = (3 + 2 * (1 + coordinates[3 * v])) * 0.1;
+}
+
+static void check_forms_at_decimal_plane(const mirror *by)
+{
+    session_input in;
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    move_to_decimal_plane(in.part.coordinates, in.part.vertex_count);
+    check_mirrored_session(&in.mesh, &in.field, by, "cells with float64 coordinates");
+    input_free(&in);
+    for (int k = 0; k < order_kind_count; k += 8) {
+        order_mesh m;
+        order_mesh_create(&order_kinds[k], 2, 0, test_wave_field, own_rank, rank_count, &m);
+        move_to_decimal_plane(m.coordinates, m.vertex_count);
+        check_mirrored_session(&m.mesh, &m.field, by, order_kinds[k].name);
+        order_mesh_free(&m);
+    }
+    for (lattice_form form = UNIFORM; form <= RECTILINEAR; form++) {
+        block b;
+        make_block(form, own_rank, &b);
+        for (int n = 0; n <= ACROSS; n++) b.axes[0][n] = (float)(0.3 + 0.1 * n);
+        if (form == UNIFORM) {
+            b.lattice.origin[0] = 0;
+            b.lattice.spacing[0] = 0.1;
+            b.lattice.first[0] = 3;
+        }
+        check_mirrored_session(&b.mesh, &b.field, by, lattice_form_name(form));
+    }
+}
+
+/* Checks that vertices in a plane that is a rounded decimal number belong to the mesh and to its image, although they
+ * are rounded in another way, and that no other vertices do. */
+static void vertices_in_decimal_planes_belong_to_both_sides(void **state)
+{
+    (void)state;
+    plane p;
+    make_plane(0, &p);
+    for (int v = 0; v < 16; v++) p.narrow[v][0] = (float)(0.3 + 0.2 * (v % 4));
+    check_mirrored_session(&p.mesh, &p.field, &decimal_mirror, "quads with float32 coordinates");
+    check_forms_at_decimal_plane(&decimal_mirror);
 }
 
 /* ---- levels of refinement ---------------------------------------------------------------------------------------- */
@@ -737,6 +798,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(cells_of_higher_order_draw_their_images),
         cmocka_unit_test(planes_and_lattices_draw_their_images),
         cmocka_unit_test(blocks_draw_their_images),
+        cmocka_unit_test(vertices_in_decimal_planes_belong_to_both_sides),
         cmocka_unit_test(levels_draw_their_images),
         cmocka_unit_test(covered_cells_of_images_follow_changes),
         cmocka_unit_test(any_partition_draws_one_picture),

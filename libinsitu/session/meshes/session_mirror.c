@@ -3,6 +3,8 @@
  * coordinates are stored with the image. */
 #include "session_mirror.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "memory.h"
@@ -16,6 +18,24 @@
 static bool is_mirrored(const session_mesh *image, int axis)
 {
     return image->mirror_axes >> axis & 1;
+}
+
+/* The mirror plane, and the coordinates of vertices in it, are often decimal numbers or computed from them, each of
+ * which is rounded in another way. For example, 0.3 as a float32 number differs from 0.3, and so does 3 * 0.1. A
+ * coordinate that differs from the plane by rounding only is its own image, to the bit. Otherwise the vertex and its
+ * image would be two vertices, with a wall between them. */
+
+/* Returns the largest difference due to rounding between two results of a few operations on numbers of this type, none
+ * of which exceeds `largest`. Each operation, and each decimal number, is rounded by at most half of the type's
+ * epsilon. The plane and the coordinate together can have eight of them. */
+static double find_rounding(insitu_type type, double largest)
+{
+    return 4 * (type == INSITU_FLOAT32 ? (double)FLT_EPSILON : DBL_EPSILON) * fabs(largest);
+}
+
+static double mirror_coordinate(double coordinate, double plane, double rounding)
+{
+    return fabs(coordinate - plane) <= rounding ? coordinate : 2 * plane - coordinate;
 }
 
 /* ---- coordinates by vertex --------------------------------------------------------------------------------------- */
@@ -43,13 +63,14 @@ static void mirror_coordinates_along_axis(const session_mesh *image, int axis, i
     const insitu_array *to = &image->mirrored.coordinates[axis];
     const int64_t count = session_get_mesh_of_caller_nodes(image->source)->vertex_count;
     const bool is_copied = !is_mirrored(image, axis);
+    const double rounding = find_rounding(to->type, plane);
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < count; v++) {
             const double coordinate = grid_read_number(&from, v);
-            session_store_coordinate(to, v, is_copied ? coordinate : 2 * plane - coordinate);
+            session_store_coordinate(to, v, is_copied ? coordinate : mirror_coordinate(coordinate, plane, rounding));
         }
         region_leave();
     }
@@ -75,6 +96,19 @@ static bool mirror_vertices(session_mesh *image, int threads)
 
 /* ---- coordinates along a lattice's axes -------------------------------------------------------------------------- */
 
+/* Mirrors coordinates along an axis of a lattice. A uniform lattice computes them from numbers that may be much larger
+ * than the result, for example as -10 + 103 * 0.1. */
+static void mirror_axis_coordinates(const insitu_lattice *given, int axis, double plane, double *coordinates)
+{
+    const insitu_array *along = &given->axes[axis];
+    for (int64_t n = 0; n <= given->cells[axis]; n++) {
+        const double steps = (double)(given->first[axis] + n),
+                     largest = along->data ? plane : fabs(given->origin[axis]) + fabs(given->spacing[axis] * steps);
+        const insitu_type type = along->data ? along->type : INSITU_FLOAT64;
+        coordinates[n] = mirror_coordinate(coordinates[n], plane, find_rounding(type, largest));
+    }
+}
+
 static bool mirror_lattice(session_mesh *image)
 {
     const insitu_lattice *given = image->source->given.lattice;
@@ -85,8 +119,7 @@ static bool mirror_lattice(session_mesh *image)
         double *coordinates = m->axes[axis];
         if (!coordinates) return false;
         session_fill_axis_coordinates(given, axis, coordinates);
-        for (int64_t n = 0; n < count && is_mirrored(image, axis); n++)
-            coordinates[n] = 2 * m->planes[axis] - coordinates[n];
+        if (is_mirrored(image, axis)) mirror_axis_coordinates(given, axis, m->planes[axis], coordinates);
         m->bytes += count * (int64_t)sizeof *coordinates;
     }
     return true;
