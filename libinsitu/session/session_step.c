@@ -127,7 +127,7 @@ static void update_statistics_and_conditions(insitu_session *s, session_plan_bas
         const session_valid_events valid = session_check_event_fields(basis, images, error);
         if (derive_statistics_and_condition_fields(s, moment, images, &own) == INSITU_OK)
             session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
-                                               &valid, &own);
+                                               &valid, &s->report, &own);
         if (!error->status) *error = own;
     }
     basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);

@@ -58,6 +58,8 @@ typedef enum session_warning_kind {
     WARNING_THRESHOLD,   /* no cell is within a threshold */
     WARNING_PLANE,       /* a plane lies outside the meshes on which it is drawn */
     WARNING_UNUSABLE,    /* values of cells are not finite */
+    WARNING_UNCOLOURED,  /* values of cells by which surfaces are coloured are not finite */
+    WARNING_UNCOUNTED,   /* no cell counts in statistics */
     WARNING_CLIP,        /* clips remove all of a layer */
     WARNING_NO_CELLS,    /* no mesh contains cells that can be drawn */
     /* a layer averages values over several meshes, but the vertices of one mesh have global ids and are not matched

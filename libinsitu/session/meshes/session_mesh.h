@@ -66,6 +66,9 @@ typedef enum session_extent_kind {
 typedef struct session_extremes {
     bool is_known; /* set if low and high are up to date */
     double low, high;
+    /* number of drawn cells that are not in the set because they have a value that is not finite; a cell that is split
+     * into pieces is counted once for each piece */
+    int64_t unusable_count;
 } session_extremes;
 
 /* A plane that cuts meshes. */

@@ -316,8 +316,8 @@ insitu_status session_warn_of_empty_layers(const session_plan *plan, const sessi
 {
     const int count = plan->cell_count ? list_layers(plan, &(layer_batch){.first = 0}) : 0;
     reduced_extras extras = {false, session_encode_rank_with_warnings(report, team)};
-    if (count && !error->status)
-        extras.has_other_cells = session_hash_unusable_fields(plan, meshes) != report->unusable_key;
+    if (plan->cell_count && !error->status)
+        extras.has_other_cells = session_hash_unusable_fields(plan, meshes, team->threads) != report->unusable_key;
     insitu_status status = INSITU_OK;
     for (int first = 0; (first == 0 || first < count) && !status; first += BATCH) {
         layer_batch batch = {.first = first};

@@ -1,4 +1,4 @@
-/* Warns of cells that layers do not show because their values are not finite. */
+/* Warns of cells that layers do not show, or show without a colour, because their values are not finite. */
 #ifndef SESSION_UNUSABLE_H
 #define SESSION_UNUSABLE_H
 
@@ -8,9 +8,9 @@
 #include "session_team.h"
 
 /* Returns a hash of the pairs (mesh, field) for which this rank has cells with values that are not finite; 0 if there
- * are no such pairs. The fields are those that the plan's isosurfaces and volumes show. The warnings are the same as
- * before if the hash has not changed on any rank. Local. */
-uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes);
+ * are no such pairs. The fields are those that the plan's isosurfaces and volumes show, and those that colour its
+ * slices and surfaces. The warnings are the same as before if the hash has not changed on any rank. Parallel. Local. */
+uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes, int threads);
 
 /* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */
 insitu_status session_warn_of_unusable_cells(const session_plan *plan, const session_catalogue *catalogue,

@@ -176,19 +176,33 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
     return true;
 }
 
-int64_t session_count_unusable_cells(const session_mesh *mesh, const session_scalar *scalar)
+static bool is_included(const grid *g, int64_t cell, bool with_shells)
+{
+    return with_shells ? grid_can_be_shown(g, cell) : grid_is_drawn(g, cell);
+}
+
+/* Returns the number of the caller's cells that have a piece with a value that is not finite. piece_count: number of
+ * these pieces. */
+static int64_t count_cells_of_unusable_pieces(const session_mesh *mesh, const session_scalar *scalar, bool with_shells,
+                                              int64_t piece_count)
 {
     const grid *g = &mesh->cells;
     int64_t count = 0;
-    if (!mesh->topology.is_split || !scalar->unusable_count) return scalar->unusable_count;
+    if (!mesh->topology.is_split || !piece_count) return piece_count;
     const grid_field field = session_get_scalar_values(mesh, scalar);
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {
         bool is_any = false;
         for (int64_t piece = session_first_piece(mesh, cell); piece < session_first_piece(mesh, cell + 1); piece++)
-            is_any = is_any || (grid_is_drawn(g, piece) && !fetch_any_cell_range(g, &field, piece).is_finite);
+            is_any =
+                is_any || (is_included(g, piece, with_shells) && !fetch_any_cell_range(g, &field, piece).is_finite);
         count += is_any;
     }
     return count;
+}
+
+int64_t session_count_unusable_cells(const session_mesh *mesh, const session_scalar *scalar)
+{
+    return count_cells_of_unusable_pieces(mesh, scalar, false, scalar->unusable_count);
 }
 
 /* ---- minima and maxima of scalars ---------------------------------------------------------------------------- */
@@ -209,20 +223,22 @@ static session_extremes find_range_of_scalar_values(const grid *g, const grid_fi
                                                     bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
+    int64_t unusable = 0;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, g->cell_count))
     {
         region_enter();
-#pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
+#pragma omp for schedule(static) reduction(min : least) reduction(max : most) reduction(+ : unusable) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++) {
-            if (of_shells ? !grid_can_be_shown(g, cell) : !grid_is_drawn(g, cell)) continue;
+            if (!is_included(g, cell, of_shells)) continue;
             const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
+            unusable += !of_cell.is_finite;
             if (!of_cell.is_finite) continue;
             if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
             most = fmax(most, of_cell.high);
         }
         region_leave();
     }
-    return (session_extremes){true, least, most};
+    return (session_extremes){true, least, most, unusable};
 }
 
 void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
@@ -237,6 +253,14 @@ void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar
     }
     *low = known->low;
     *high = known->high;
+}
+
+int64_t session_count_uncoloured_cells(const session_mesh *mesh, session_scalar *scalar, int threads)
+{
+    double low, high;
+    session_find_scalar_extent(mesh, scalar, threads, SESSION_SEEN, &low, &high);
+    return count_cells_of_unusable_pieces(mesh, scalar, includes_shells(scalar, SESSION_SEEN),
+                                          scalar->extremes[SESSION_SEEN].unusable_count);
 }
 
 void session_clear_extents(session_scalar *scalar)

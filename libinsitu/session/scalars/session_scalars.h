@@ -70,6 +70,11 @@ mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_s
  * there are none. kind: selects among these cells. Parallel. Local. */
 void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                                 double *low, double *high);
+
+/* Returns the number of the caller's drawn cells, including shells, that have a value which is not finite, so that
+ * colours by the scalar lack in places. Reads all values if they have changed since they were read for an extent.
+ * Parallel. Local. */
+int64_t session_count_uncoloured_cells(const session_mesh *mesh, session_scalar *scalar, int threads);
 /* Marks the stored minima and maxima as unknown, because the values have changed. */
 void session_clear_extents(session_scalar *scalar);
 

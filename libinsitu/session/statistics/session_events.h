@@ -4,6 +4,7 @@
 #define SESSION_EVENTS_H
 
 #include "session_catalogue.h"
+#include "session_report.h"
 #include "session_statistics.h"
 
 typedef struct session_event_time {
@@ -32,12 +33,12 @@ bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycl
 
 /* Computes the statistics that are due and writes them to their files. Also computes the statistics on which images'
  * conditions depend, and stores which conditions hold. Only the events in `valid`, which must be the same on all ranks,
- * are processed. If an event fails, the other events are still processed, and the error is returned afterwards.
- * Collective. */
+ * are processed. Warns of those that count no cell. If an event fails, the other events are still processed, and the
+ * error is returned afterwards. Collective. */
 insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
                                                  const session_catalogue *catalogue, const session_team *team,
                                                  const session_event_time *now, const session_valid_events *valid,
-                                                 base_error *error);
+                                                 session_report *report, base_error *error);
 
 /* Returns the images that may be drawn in this step, one bit for each. An image may be drawn if its condition holds,
  * unless the scene draws it only once and it has been drawn before. */
