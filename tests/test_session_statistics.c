@@ -191,6 +191,25 @@ static void files_do_not_depend_on_the_partition(void **state)
         }
 }
 
+/* Checks that zeros are written without a sign: which of the values 0 and -0 is the minimum would depend on the
+ * partition. */
+static void zeros_are_written_without_a_sign(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    for (int kind = 1; kind <= 3; kind++) {
+        session_input in = {0};
+        make_part(TEST_HEXES, 0, false, &in);
+        for (int64_t v = 0; v < in.part.vertex_count; v++)
+            in.part.values[v] = kind == 1 || (kind == 3 && v % 2) ? -0.0 : 0.0;
+        if (own_rank == 0) unlink("zeros.csv");
+        run_steps(NEVER "statistics: [{field: f, path: zeros.csv, histogram: {bins: 2}}]\n", &in, 0, 1);
+        read_file("zeros.csv", MOST, text);
+        everywhere(own_rank != 0 || strstr(text, ",8,0,0,0,0,0,0,") != NULL);
+        input_free(&in);
+    }
+}
+
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
 static void restarted_runs_continue_the_file(void **state)
@@ -319,6 +338,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(bent_and_concave_cells_fill_their_cube),
                                        cmocka_unit_test(cell_counts_are_sums_over_ranks),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
+                                       cmocka_unit_test(zeros_are_written_without_a_sign),
                                        cmocka_unit_test(restarted_runs_continue_the_file),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(other_fields_are_found_if_a_field_is_missing),

@@ -43,8 +43,10 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
     }
     const insitu_status status =
         session_check_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
-    *low = all[0];
-    *high = -all[1];
+    /* if values are 0 and -0, it depends on the partition which of them the reductions return; the sums with 0.0 are 0
+     * in both cases */
+    *low = all[0] + 0.0;
+    *high = -all[1] + 0.0;
     return status;
 }
 

@@ -278,8 +278,12 @@ static void begin_statistics(const statistics_work *w, int request, session_stat
     const session_statistics_request *of = &w->requests[request];
     const double *ends = find_request_extremes(w, request);
     const bool has_range = of->low <= of->high;
-    *out = (session_statistics){
-        .is_of_shells = is_of_shells(w, request), .minimum = ends[0], .maximum = -ends[1], .bin_count = of->bin_count};
+    /* if values are 0 and -0, it depends on the partition which of them the reductions return; the sums with 0.0 are 0
+     * in both cases */
+    *out = (session_statistics){.is_of_shells = is_of_shells(w, request),
+                                .minimum = ends[0] + 0.0,
+                                .maximum = -ends[1] + 0.0,
+                                .bin_count = of->bin_count};
     out->low = has_range ? of->low : out->minimum;
     out->high = has_range ? of->high : out->maximum;
 }
