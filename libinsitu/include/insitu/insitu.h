@@ -185,9 +185,10 @@ typedef struct insitu_lattice {
      * such as 1, 2 or 8. It is at most 2^20, and is not read along an axis without cells. All 0: the mesh has no
      * levels. If levels are given, first is the index of the block's first cell along each axis, counted in cells of
      * the block's level; its magnitude is at most 2^40. A cell is not drawn if the interior of a finer block of the
-     * mesh, on any rank, covers it. Finer blocks must end at borders of the coarser cells that no other block covers. A
-     * vertex within a face or an edge of a coarser cell gets the value that is interpolated on that face or edge, even
-     * if values are given at vertices. */
+     * mesh, on any rank, covers it. Finer blocks must end at borders of the coarser cells that no other block covers.
+     * If blocks of two levels touch, one number should be a multiple of the other along each axis; otherwise surfaces
+     * have slits there. A vertex within a face or an edge of a coarser cell gets the value that is interpolated on that
+     * face or edge, even if values are given at vertices. */
     int64_t refinement[3];
 } insitu_lattice;
 
