@@ -805,6 +805,154 @@ static void gradients_ignore_given_values_at_hanging_vertices(void **state)
         expect_same_gradients((const two_levels[]){{ratio, 1, false, 0}, {ratio, 1, false, 7}}, 1, 0);
 }
 
+/* ---- quads ------------------------------------------------------------------------------------------------------- */
+
+enum { STRIPS = 3, LONG = 4, MOST_ALONG = 8 * LONG + 1 };
+
+/* A plane of quads in three strips, each of which is finer than the one before: their refinements are 1, `ratio` and
+ * 2 * ratio. Strip b goes from 2 * b to 2 * b + 2 along the axis `across`, and from 0 to LONG along the axis `along`.
+ */
+typedef struct quad_strips {
+    int across, along; /* the third axis has no cells */
+    int ratio;
+    bool is_of_cells; /* true: the field has cell values; false: it has values at vertices */
+    bool is_turned;   /* set if the coordinates are given by vertex, and the plane is turned */
+} quad_strips;
+
+typedef struct quad_strip {
+    insitu_lattice lattice;
+    int64_t vertex_count, cell_count;
+    double values[MOST_ALONG * MOST_ALONG * 2], places[MOST_ALONG * MOST_ALONG * 2][3];
+} quad_strip;
+
+static int get_strip_refinement(const quad_strips *q, int number)
+{
+    return number == 0 ? 1 : number * q->ratio;
+}
+
+static bool is_hanging_in_strip(const quad_strips *q, int number, int across, int along)
+{
+    return number > 0 && across == 0 && along % (number == 1 ? q->ratio : 2) != 0;
+}
+
+static double compute_plane_value(double across, double along)
+{
+    return sin(across) + sin(1.7 * along) * along;
+}
+
+/* Sets the values at the strip's vertices. Those at hanging vertices are wrong by 1. */
+static void fill_strip_vertices(const quad_strips *q, int number, quad_strip *out)
+{
+    const insitu_lattice *l = &out->lattice;
+    const double of = get_strip_refinement(q, number);
+    const int64_t wide[2] = {l->cells[0] + 1, l->cells[1] + 1};
+    for (int64_t v = 0; v < out->vertex_count; v++) {
+        const int at[3] = {(int)(v % wide[0]), (int)(v / wide[0] % wide[1]), (int)(v / wide[0] / wide[1])};
+        const double across = 2 * number + at[q->across] / of, along = at[q->along] / of;
+        const double place[3] = {0.6 * across, 0.8 * across, along};
+        memcpy(out->places[v], place, sizeof place);
+        out->values[v] =
+            compute_plane_value(across, along) + is_hanging_in_strip(q, number, at[q->across], at[q->along]);
+    }
+}
+
+static void make_strip(const quad_strips *q, int number, quad_strip *out)
+{
+    const int of = get_strip_refinement(q, number);
+    insitu_lattice *l = &out->lattice;
+    memset(out, 0, sizeof *out);
+    l->cells[q->across] = 2 * (int64_t)of;
+    l->cells[q->along] = LONG * (int64_t)of;
+    l->first[q->across] = 2 * (int64_t)number * of;
+    for (int axis = 0; axis < 3; axis++) {
+        l->refinement[axis] = of;
+        l->spacing[axis] = q->is_turned ? 0 : 1.0 / of;
+    }
+    out->vertex_count = (l->cells[q->across] + 1) * (l->cells[q->along] + 1);
+    out->cell_count = l->cells[q->across] * l->cells[q->along];
+    fill_strip_vertices(q, number, out);
+    for (int64_t cell = 0; cell < out->cell_count && q->is_of_cells; cell++)
+        out->values[cell] = sin(13 * (double)cell + number);
+}
+
+static bool submit_strip(insitu_session *session, const quad_strips *q, int number, const quad_strip *strip)
+{
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    insitu_field_defaults(&field);
+    mesh.lattice = &strip->lattice;
+    mesh.vertex_count = strip->vertex_count;
+    mesh.cell_count = strip->cell_count;
+    for (int axis = 0; axis < 3 && q->is_turned; axis++)
+        mesh.coordinates[axis] = (insitu_array){&strip->places[0][axis], INSITU_FLOAT64, 24};
+    field.name = "f";
+    field.centring = q->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
+    field.count = q->is_of_cells ? strip->cell_count : strip->vertex_count;
+    field.values = (insitu_array){strip->values, INSITU_FLOAT64, 0};
+    return insitu_set_block(session, "m", number, &mesh) == INSITU_OK &&
+           insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
+}
+
+/* Checks that hanging vertices of a strip have the values interpolated between the ends of the coarser edges, and that
+ * values at all other vertices are those that were given. */
+static bool check_strip_values(const insitu_session *session, const quad_strips *q)
+{
+    const session_parts parts = session_find_parts(&session->meshes, "m");
+    for (int i = 0; i < parts.count; i++) {
+        const session_mesh *part = parts.items[i];
+        const double *values = part->scalar_count == 1 ? part->scalars[0].vertex_values : NULL;
+        const int number = (int)part->block, ratio = number == 1 ? q->ratio : 2;
+        const insitu_lattice *l = part->given.lattice;
+        const int64_t step = q->along > q->across ? l->cells[q->across] + 1 : 1;
+        if (!values) return false;
+        for (int64_t n = 0; n <= l->cells[q->along]; n++) {
+            const int64_t low = n / ratio * ratio;
+            const double share = (double)(n - low) / ratio;
+            const bool is_hanging = is_hanging_in_strip(q, number, 0, (int)n);
+            double expected = values[n * step];
+            if (is_hanging) expected = (1 - share) * values[low * step] + share * values[(low + ratio) * step];
+            if (!is_hanging && !q->is_of_cells)
+                expected = compute_plane_value(2 * number, (double)n / get_strip_refinement(q, number));
+            if (fabs(values[n * step] - expected) > 1e-13 * LONG) return false;
+        }
+    }
+    return true;
+}
+
+static void check_quad_strips(const quad_strips *q)
+{
+    static const char scene[] =
+        "images:\n  - name: a\n    size: [40, 40]\n    layers:\n      - surface: {colour_by: {field: f, "
+        "interpolate: vertex}}\n    outputs: [{path: a.exr}]\n";
+    static quad_strip strips[STRIPS];
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int number = 0; number < STRIPS; number++) {
+        make_strip(q, number, &strips[number]);
+        if (number % rank_count == own_rank) assert_true(submit_strip(session, q, number, &strips[number]));
+    }
+    caught_picture picture = step_and_take_picture(session, 0);
+    everywhere(check_strip_values(session, q));
+    free_caught(&picture);
+    insitu_destroy(&session);
+}
+
+/* Checks that vertices within edges of coarser quads have the values interpolated on these edges, with cell values and
+ * with values at vertices, for planes along each pair of axes. */
+static void values_are_interpolated_on_edges_of_quads(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 48; kind++) {
+        const int flat = kind % 3, is_swapped = kind / 3 % 2;
+        const quad_strips q = {.across = (flat + 1 + is_swapped) % 3,
+                               .along = (flat + 2 - is_swapped) % 3,
+                               .ratio = 2 + kind / 6 % 2,
+                               .is_of_cells = kind / 12 % 2,
+                               .is_turned = kind / 24};
+        check_quad_strips(&q);
+    }
+}
+
 static int set_up_test_group(void **state)
 {
     (void)state;
@@ -821,5 +969,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell),
                                        cmocka_unit_test(gradients_merge_vertices_that_differ_in_last_bits),
                                        cmocka_unit_test(gradients_ignore_given_values_at_hanging_vertices)};
-    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
+    cmocka_unit_test(values_are_interpolated_on_edges_of_quads)
+};
+return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

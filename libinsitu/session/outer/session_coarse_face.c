@@ -44,7 +44,7 @@ static session_box find_bounding_box(const double positions[][3], int count)
 }
 
 /* Computes the face's normal, box, area and width. side: 1 if the right-hand normal of the vertex loop points away from
- * the cell, -1 if it points to the cell. */
+ * the cell, -1 if it points to the cell, 0 if the face is a shell. */
 static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];
@@ -83,8 +83,9 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
     const session_face_loop loop = session_find_face_loop(&faces, face->face);
-    if (loop.size < 3 || loop.size > 4 || faces.size) return false;
+    if (loop.size < 3 || loop.size > 4) return false;
     out->count = (int)loop.size;
+    out->is_shell = faces.size > 0;
     for (int i = 0; i < out->count; i++) {
         out->vertices[i] = session_face_vertex(&loop, i);
         grid_read_vertex_position(g, out->vertices[i], out->corner_positions[i]);
@@ -138,6 +139,7 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     const int step =
         vector3_compare(positions[(least + count - 1) % count], positions[(least + 1) % count]) < 0 ? count - 1 : 1;
     out->count = count;
+    out->is_shell = outline.is_shell;
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
         memcpy(out->corner_positions[i], positions[from], sizeof positions[from]);
@@ -145,7 +147,7 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     }
     measure_face(out, 1);
     if (!(out->area > 0)) return false;
-    measure_face(out, find_normal_sign(g, face->cell, out));
+    measure_face(out, out->is_shell ? 0 : find_normal_sign(g, face->cell, out));
     return true;
 }
 
@@ -155,15 +157,17 @@ void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SE
     measure_face(&other, 1);
     const double along = vector3_dot(other.normal, face->normal);
     memcpy(words, face->corner_positions, sizeof face->corner_positions);
-    words[SESSION_FACE_WORDS - 1] = (uint64_t)(4 * face->count + (along > 0) - (along < 0));
+    words[SESSION_FACE_WORDS - 1] = (uint64_t)(8 * face->count + 4 * face->is_shell + (along > 0) - (along < 0));
 }
 
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out)
 {
     const int64_t last = (int64_t)words[SESSION_FACE_WORDS - 1];
     memcpy(out->corner_positions, words, sizeof out->corner_positions);
-    out->count = (int)((last + 1) / 4);
-    measure_face(out, (double)(last - 4 * out->count));
+    const int64_t count_and_kind = (last + 1) / 4;
+    out->count = (int)(count_and_kind / 2);
+    out->is_shell = count_and_kind % 2;
+    measure_face(out, (double)(last - 4 * count_and_kind));
 }
 
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b)

@@ -23,6 +23,10 @@ static const double relative_slack = 1e-5;
  * parts has twice the area of each part. */
 static const double least_ratio = 1.25;
 
+/* Two edges of shells lie along the same line if the cosine of the angle between them exceeds this number. It is 1, up
+ * to rounding, for an edge and the parts into which it is divided. */
+static const double collinear = 0.9;
+
 /* Two faces have opposite orientation if the dot product of their normals is below this number. The dot product is -1
  * for exactly opposite faces, apart from the curvature of divided faces; it is 0, up to rounding, for walls at right
  * angles. */
@@ -492,15 +496,77 @@ static double find_largest_opposite_area(const hanging_search *s, const candidat
     return area;
 }
 
+/* Finds the edge of the shell f on which a position lies. weights: weights of the corners at this position. Returns
+ * false if the position is not on an edge, or is a corner. */
+static bool find_edge_by_weights(const session_coarse_face *f, const double weights[4], double edge[3])
+{
+    int ends[4], count = 0;
+    for (int k = 0; k < 4; k++)
+        if (weights[k] > 0) ends[count++] = k;
+    if (count != 2) return false;
+    for (int axis = 0; axis < 3; axis++)
+        edge[axis] = f->corner_positions[ends[1]][axis] - f->corner_positions[ends[0]][axis];
+    return true;
+}
+
+/* Returns the length of the edge from the corner at the candidate's position to the next (step 1) or previous corner
+ * (step -1) if it lies along `direction`; otherwise 0. */
+static double measure_collinear_edge(const session_coarse_face *f, const double position[3], int step,
+                                     const double direction[3])
+{
+    int nearest = 0;
+    double edge[3];
+    for (int i = 1; i < f->count; i++)
+        if (session_point_distance(f->corner_positions[i], position) <
+            session_point_distance(f->corner_positions[nearest], position))
+            nearest = i;
+    const double *end = f->corner_positions[(nearest + f->count + step) % f->count];
+    for (int axis = 0; axis < 3; axis++) edge[axis] = end[axis] - f->corner_positions[nearest][axis];
+    const double length = sqrt(vector3_dot(edge, edge)), along = vector3_dot(edge, direction);
+    return fabs(along) > collinear * length * sqrt(vector3_dot(direction, direction)) ? length : 0;
+}
+
+/* Returns the greatest length of the edges along `direction` at the candidate's corner of shells; 0 if there are
+ * none. */
+static double find_longest_collinear_edge(const hanging_search *s, const candidate *c, const double direction[3])
+{
+    double length = 0;
+    for (int64_t i = c->corner_list; i >= 0; i = s->contacts[i].next_contact) {
+        const session_coarse_face *other = &s->faces[s->contacts[i].face].face;
+        for (int step = -1; step <= 1 && other->is_shell; step += 2)
+            length = fmax(length, measure_collinear_edge(other, c->position, step, direction));
+    }
+    return length;
+}
+
+/* Returns whether the candidate hangs on the face that it touches according to session_hanging.h. */
+static bool is_hanging_on(const hanging_search *s, const candidate *c, const contact *hit)
+{
+    const session_coarse_face *f = &s->faces[hit->face].face;
+    double edge[3];
+    if (!f->is_shell) {
+        const double area = find_largest_opposite_area(s, c, f);
+        return area > 0 && f->area > least_ratio * area;
+    }
+    if (!find_edge_by_weights(f, hit->weights, edge)) return false;
+    const double length = find_longest_collinear_edge(s, c, edge);
+    return length > 0 && sqrt(vector3_dot(edge, edge)) > least_ratio * length;
+}
+
+/* Returns whether a vertex that hangs on both faces takes its value from a and not from b. */
+static bool is_preferred(const session_coarse_face *a, const session_coarse_face *b)
+{
+    return a->is_shell != b->is_shell ? b->is_shell : session_is_larger_face(a, b);
+}
+
 /* Chooses, of the faces on which the candidate lies, the largest one on which it hangs according to session_hanging.h.
  * Sets c->face and c->weights if there is one. */
 static void choose_face_of_hanging_vertex(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {
         const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
-        const double area = find_largest_opposite_area(s, c, f);
-        if (!(area > 0 && f->area > least_ratio * area)) continue;
-        if (c->face >= 0 && !session_is_larger_face(f, &s->faces[c->face].face)) continue;
+        if (!is_hanging_on(s, c, &s->contacts[i])) continue;
+        if (c->face >= 0 && !is_preferred(f, &s->faces[c->face].face)) continue;
         c->face = s->contacts[i].face;
         memcpy(c->weights, s->contacts[i].weights, sizeof c->weights);
     }

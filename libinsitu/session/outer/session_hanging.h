@@ -12,7 +12,10 @@
  * there, a large cell and small ones lie on the same side of the vertex. If the vertex can hang on several faces, the
  * largest one is used. A corner of a face may itself be a hanging vertex on a still larger face. The face, and the
  * vertex's position on it, are determined from coordinates alone, with the same result on all ranks, regardless of
- * which mesh of a mesh group has the face. */
+ * which mesh of a mesh group has the face.
+ *
+ * Triangles and quads that are cells (shells) have no other side. There, a vertex hangs on an edge of a shell if edges
+ * of other shells along the same line end at this vertex, and all of them are shorter. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
