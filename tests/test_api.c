@@ -333,6 +333,17 @@ static void calls_on_null_session_return_errors(void **context)
     assert_int_equal(insitu_destroy(NULL), INSITU_OK);
 }
 
+/* Returns whether the calls that communicate return an error after MPI_Finalize(), and do not abort the process. */
+static bool are_calls_after_finalize_refused(insitu_session *session)
+{
+    insitu_session *late = NULL;
+    return insitu_create_from_text(MPI_COMM_WORLD, "", &late) == INSITU_ERROR_MPI && !late &&
+           insitu_step(session, 0, 0) == INSITU_ERROR_MPI &&
+           !strcmp(insitu_error(session), "insitu_step: MPI is not running") &&
+           insitu_keep_pictures(session, 1) == INSITU_ERROR_MPI &&
+           !strcmp(insitu_error(session), "insitu_keep_pictures: MPI is not running");
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
@@ -357,6 +368,7 @@ int main(int argc, char **argv)
     write_scene("unused.png");
     failed += insitu_create(MPI_COMM_WORLD, scene_name, &late) != INSITU_OK;
     MPI_Finalize();
+    failed += !are_calls_after_finalize_refused(late);
     /* The session is destroyed after MPI_Finalize(). insitu_destroy() must return an error and not crash. */
     failed += insitu_destroy(&late) != INSITU_OK || late || !is_refused;
     return failed;

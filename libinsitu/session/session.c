@@ -53,14 +53,6 @@ const char *insitu_status_name(insitu_status status)
     return "unknown status";
 }
 
-static bool is_mpi_running(void)
-{
-    int is_initialized = 0, is_finalized = 0;
-    MPI_Initialized(&is_initialized);
-    if (is_initialized) MPI_Finalized(&is_finalized);
-    return is_initialized && !is_finalized;
-}
-
 static void free_session(insitu_session *session)
 {
     session_writer_end(&session->writer); /* the writer uses the scene, and must end before the scene is freed */
@@ -115,7 +107,7 @@ static insitu_status open_session(MPI_Comm comm, const session_scene_source *sou
     base_error *error = &thread_error;
     *error = (base_error){0};
     if (out) *out = NULL;
-    if (!is_mpi_running()) return base_fail(error, INSITU_ERROR_MPI, "%s: MPI is not running", source->call);
+    if (session_require_mpi(source->call, error)) return error->status;
     if (comm == MPI_COMM_NULL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s: the communicator is MPI_COMM_NULL", source->call);
     int is_inter = 0;
@@ -144,7 +136,7 @@ insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, ins
 
 insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_text, insitu_session **out)
 {
-    const MPI_Comm of_c = is_mpi_running() ? MPI_Comm_f2c(comm) : MPI_COMM_NULL;
+    const MPI_Comm of_c = session_is_mpi_running() ? MPI_Comm_f2c(comm) : MPI_COMM_NULL;
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
@@ -201,6 +193,7 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 {
     base_error error = {.status = INSITU_OK};
     if (!session || refuse_call_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
+    if (session_require_mpi("insitu_keep_pictures", &error)) return store_error_in_session(session, &error);
     session_free_kept_pictures(&session->kept_pictures);
     int is_on = keep != 0;
     if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
@@ -228,7 +221,7 @@ insitu_status insitu_destroy(insitu_session **session)
     session_writer_drain(&s->writer);
     session_writer_collect_results(&s->writer, &s->report);
     if (s->writer.failure_count) thread_error = session_writer_take_failure(&s->writer);
-    if (is_mpi_running()) {
+    if (session_is_mpi_running()) {
         session_broadcast_error(s->team.comm, 0, &thread_error);
         session_team_free(&s->team);
     }

@@ -369,10 +369,11 @@ static void queue_report_json(insitu_session *s)
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
 {
     if (!session || session_refuse_call_in_fill(&session->meshes, "insitu_step")) return INSITU_ERROR_ARGUMENT;
+    session->error = (base_error){0};
+    if (session_require_mpi("insitu_step", &session->error)) return session->error.status;
     session_guard guard;
     session_guard_save_settings(&guard);
     const double start = MPI_Wtime();
-    session->error = (base_error){0};
     session_free_kept_pictures(&session->kept_pictures);
     session_report_begin(&session->report, cycle, time);
     session_changes changes;

@@ -19,7 +19,7 @@ typedef enum insitu_status {
     INSITU_ERROR_FIELD = 4,   /* an error in a field: missing, of the wrong length, of the wrong centring */
     INSITU_ERROR_IO = 5,      /* an image could not be written */
     INSITU_ERROR_MEMORY = 6,  /* an allocation failed */
-    INSITU_ERROR_MPI = 7,     /* MPI returned an error, or ranks have made different calls */
+    INSITU_ERROR_MPI = 7,     /* MPI is not running or returned an error, or ranks have made different calls */
     INSITU_ERROR_INTERNAL = 8 /* an error in the library itself */
 } insitu_status;
 

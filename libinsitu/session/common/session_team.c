@@ -3,6 +3,20 @@
 #include "session_agree.h"
 #include "session_cores.h"
 
+bool session_is_mpi_running(void)
+{
+    int is_initialized = 0, is_finalized = 0;
+    MPI_Initialized(&is_initialized);
+    if (is_initialized) MPI_Finalized(&is_finalized);
+    return is_initialized && !is_finalized;
+}
+
+insitu_status session_require_mpi(const char *call, base_error *error)
+{
+    if (session_is_mpi_running()) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MPI, "%s: MPI is not running", call);
+}
+
 static insitu_status duplicate_communicator(MPI_Comm comm, MPI_Comm *out, base_error *error)
 {
     const insitu_status status = session_check_mpi(error, MPI_Comm_dup(comm, out), "MPI_Comm_dup");

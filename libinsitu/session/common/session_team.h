@@ -23,6 +23,13 @@ typedef struct session_team {
     int threads;         /* number of this rank's threads in this step; 0 before the first step */
 } session_team;
 
+/* Returns whether MPI has been initialized and not been finalized. Local. */
+bool session_is_mpi_running(void);
+
+/* Stores the error that `call` needs MPI, if MPI is not running. Calls that communicate must check this first, because
+ * MPI aborts the process if it is called at any other time. Local. */
+insitu_status session_require_mpi(const char *call, base_error *error);
+
 /* Creates two duplicates of the caller's communicator. Even after an error, the caller must free *out, which then
  * contains the communicators that were created. Collective. */
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error);
