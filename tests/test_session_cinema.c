@@ -390,6 +390,52 @@ static void reports_have_warnings_and_edits(void **state)
 #undef SCENE
 }
 
+/* Makes a step whose error names a field of this name, and reads report.json. */
+static void read_report_of_wrong_field(insitu_session *session, const session_input *in, const char *name,
+                                       char text[MOST])
+{
+    insitu_field field = in->field;
+    field.name = name;
+    field.count = -1;
+    assert_int_equal(submit_input(session, in), INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_ERROR_FIELD);
+    everywhere(insitu_step(session, 0, 0) == INSITU_ERROR_FIELD);
+    read_file("out/n.cdb/report.json", MOST, text);
+}
+
+/* Checks that report.json is UTF-8 if an error names a field whose name is not, or ends inside a character because it
+ * is too long. The first name has bytes that are no characters: a byte of Latin-1, a character without its last byte, a
+ * form that is too long, a surrogate and a number above U+10FFFF. */
+static void reports_are_utf8_whatever_names_contain(void **state)
+{
+    (void)state;
+    static const char scene[] =
+        "writing: step\nimages:\n" IMAGE("a", "", "{isosurface: {field: f, values: [7]}}", "{cinema: out/n.cdb}");
+    static const char invalid[] = "<\xe9<\xe2\x82<\xc1\xbf<\xed\xa0\x80<\xf4\x90\x80\x80<";
+    static const char replaced[] = "<\\ufffd<\\ufffd\\ufffd<\\ufffd\\ufffd<\\ufffd\\ufffd\\ufffd"
+                                   "<\\ufffd\\ufffd\\ufffd\\ufffd<";
+    static const char valid[] = "<\xc2\xa9<\xe2\x82\xac<\xf0\x9d\x84\x9e<";
+    static char text[MOST], name[2001];
+    session_input in = {0};
+    make_input(&in);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    read_report_of_wrong_field(session, &in, invalid, text);
+    everywhere(own_rank != 0 || strstr(text, replaced));
+    read_report_of_wrong_field(session, &in, valid, text);
+    everywhere(own_rank != 0 || (strstr(text, valid) && !strstr(text, "ufffd")));
+    int cut_count = 0;
+    for (int first = 0; first < 2; first++) { /* one of the two messages ends inside a character of two bytes */
+        for (int i = 0; i < 2000; i++) name[i] = i < first ? 'a' : (i - first) % 2 ? '\xa9' : '\xc3';
+        read_report_of_wrong_field(session, &in, name, text);
+        cut_count += strstr(text, "\xa9\\ufffd\"") != NULL;
+        everywhere(!strstr(text, "\xc3\""));
+    }
+    everywhere(own_rank != 0 || cut_count == 1);
+    discard_pictures();
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
 /* Rank 0's pictures of a scene at one cycle, kept while another scene is drawn. */
@@ -543,6 +589,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(unwritable_pictures_have_no_table_line),
                                        cmocka_unit_test(tables_stay_complete_if_memory_runs_out),
                                        cmocka_unit_test(reports_have_warnings_and_edits),
+                                       cmocka_unit_test(reports_are_utf8_whatever_names_contain),
                                        cmocka_unit_test(sweeps_draw_same_pictures_as_single_images),
                                        cmocka_unit_test(orbits_draw_same_pictures_as_single_cameras),
                                        cmocka_unit_test(paths_draw_same_pictures_as_single_cameras),

@@ -36,17 +36,35 @@ void session_record_step_messages(session_news *news, const session_report *repo
 
 /* ---- text of report.json --------------------------------------------------------------------------------------- */
 
-/* Adds a JSON string in quotes, or null if text is NULL. */
+/* Returns the size in bytes of the UTF-8 character at the start of a text that is not empty, or 0 if the text does not
+ * start with one. Longer forms than necessary, surrogates and numbers above U+10FFFF are no characters (RFC 3629). */
+static size_t count_character_bytes(const unsigned char *text)
+{
+    if (text[0] < 0x80) return 1;
+    const size_t size = text[0] < 0xc2 ? 0 : text[0] < 0xe0 ? 2 : text[0] < 0xf0 ? 3 : text[0] < 0xf5 ? 4 : 0;
+    const unsigned least = text[0] == 0xe0 ? 0xa0 : text[0] == 0xf0 ? 0x90 : 0x80;
+    const unsigned most = text[0] == 0xed ? 0x9f : text[0] == 0xf4 ? 0x8f : 0xbf;
+    if (size == 0 || text[1] < least || text[1] > most) return 0;
+    for (size_t i = 2; i < size; i++)
+        if ((text[i] & 0xc0) != 0x80) return 0;
+    return size;
+}
+
+/* Adds a JSON string in quotes, or null if text is NULL. JSON must be UTF-8, but a name of the simulation may have
+ * another encoding, and a message may have been cut inside a character. Bytes of no character become U+FFFD. */
 static void add_quoted(text_output *out, const char *text)
 {
     text_add(out, text ? "\"" : "null", text ? 1 : 4);
-    for (; text && *text; text++) {
-        if ((unsigned char)*text < 0x20) {
-            text_print(out, "\\u%04x", (unsigned)(unsigned char)*text);
-            continue;
+    while (text && *text) {
+        const unsigned char byte = (unsigned char)*text;
+        const size_t size = count_character_bytes((const unsigned char *)text);
+        if (byte < 0x20 || size == 0) {
+            text_print(out, "\\u%04x", size ? byte : 0xfffdU);
+        } else {
+            if (byte == '"' || byte == '\\') text_add(out, "\\", 1);
+            text_add(out, text, size);
         }
-        if (*text == '"' || *text == '\\') text_add(out, "\\", 1);
-        text_add(out, text, 1);
+        text += size ? size : 1;
     }
     if (text) text_add(out, "\"", 1);
 }
