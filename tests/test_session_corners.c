@@ -429,12 +429,48 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
+/* Checks that a mesh with a field at corners and with polyhedra is left out alone: the other fields of this mesh and
+ * of another one are drawn. */
+static void other_fields_are_drawn_if_corners_have_no_order(void **state)
+{
+    (void)state;
+    static const char scene[] = "images:\n" IMAGE("a", "      - surface: {colour_by: f}\n")
+        IMAGE("b", "      - isosurface: {field: v, values: [0.2]}\n")
+            IMAGE("c", "      - isosurface: {field: g, values: [0.2]}\n");
+    session_input in = {0}, other = {0};
+    input_create(&in, own_rank == rank_count - 1 ? TEST_POLYHEDRA : TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    input_create(&other, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    other.field.name = "g";
+    double *zeros = calloc((size_t)in.part.connectivity_count + 1, sizeof *zeros);
+    assert_non_null(zeros);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int cycle = 0; cycle < 3; cycle++) {
+        insitu_field at_vertices = in.field;
+        at_vertices.name = "v";
+        everywhere(insitu_set_mesh(session, "other", &other.mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "other", &other.field) == INSITU_OK);
+        everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &at_vertices) == INSITU_OK);
+        set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
+        discard_pictures();
+        check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_ERROR_FIELD,
+                                  "is a polyhedron, whose corners", "cell ");
+        everywhere(insitu_last_report(session)->images == 2);
+    }
+    discard_pictures();
+    insitu_destroy(&session);
+    free(zeros);
+    input_free(&in);
+    input_free(&other);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(corner_fields_match_duplicated_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_match_plain_corners),
                                        cmocka_unit_test(joined_corners_have_their_means),
                                        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
-                                       cmocka_unit_test(wrong_array_contents_are_reported_on_all_ranks)};
+                                       cmocka_unit_test(wrong_array_contents_are_reported_on_all_ranks),
+                                       cmocka_unit_test(other_fields_are_drawn_if_corners_have_no_order)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -179,7 +179,8 @@ static void errors_are_reported_on_all_ranks(void **state)
         if (own_rank == rank_count - 1) f.status = cases[i].status, f.corrupt = cases[i].corrupt;
         discard_pictures();
         check_reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
-        everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
+        /* the statistics have read f before the image is planned, which then is left out and does not need g */
+        everywhere(caught_count == 0 && f.calls == 1 && g.calls == 0);
         f.status = INSITU_OK;
         f.corrupt = NULL;
         check_step_succeeds(session, 2 * i + 1);

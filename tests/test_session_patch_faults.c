@@ -3,6 +3,7 @@
  * drawn, and the next step after the correction must draw. */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
@@ -313,9 +314,70 @@ static void patches_of_hexes_require_vertices(void **state)
     input_free(&input);
 }
 
+static int count_lines(const char *path)
+{
+    static char text[1 << 12];
+    int count = 0;
+    read_file(path, sizeof text, text);
+    for (const char *c = text; *c; c++) count += *c == '\n';
+    return count;
+}
+
+/* Checks that images and statistics of another field do not depend on an error in a patch. The patched field is
+ * averaged at vertices for an image, and for the statistics of a field that is derived from it. */
+static void other_fields_are_drawn_if_a_patch_is_wrong(void **state)
+{
+    (void)state;
+    static const char patched[] = "images:\n"
+                                  "  - {name: a, size: [24, 16], layers: [{isosurface: {field: f, values: [0.2]}}], "
+                                  "outputs: [{path: a.exr}]}\n"
+                                  "  - {name: b, size: [24, 16], layers: [{isosurface: {field: g, values: [0.2]}}], "
+                                  "outputs: [{path: b.exr}]}\n";
+    static const char derived[] = "fields: {s: {gradient: f, component: x}}\n"
+                                  "statistics: [{field: s, path: s.csv}, {field: g, path: g.csv}]\n";
+    char text[2048];
+    for (int with_derived = 0; with_derived < 2; with_derived++) {
+        if (own_rank == 0) unlink("s.csv"), unlink("g.csv");
+        snprintf(text, sizeof text, "%s%s", with_derived ? derived : "", patched);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+        for (int cycle = 0; cycle < 3; cycle++) {
+            create_input();
+            describe_mesh_and_patch();
+            if (cycle == 1 && own_rank == rank_count - 1) set_inner_face_number();
+            insitu_field g;
+            insitu_field_defaults(&g);
+            g.name = "g";
+            g.count = input.part.vertex_count;
+            g.values = (insitu_array){input.part.values, INSITU_FLOAT64, 0};
+            everywhere(submit_input(session, &input) == INSITU_OK);
+            everywhere(insitu_set_field(session, "m", &g) == INSITU_OK);
+            discard_pictures();
+            const insitu_status status = insitu_step(session, cycle, 0);
+            if (cycle == 1)
+                check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                                          "field \"f\": patch 0: face 1 is between");
+            else
+                everywhere(status == INSITU_OK);
+            everywhere(insitu_last_report(session)->images == (cycle == 1 ? 1 : 2));
+            input_free(&input);
+        }
+        insitu_destroy(&session);
+        everywhere(own_rank != 0 || !with_derived || (count_lines("g.csv") == 4 && count_lines("s.csv") == 3));
+    }
+    discard_pictures();
+    free_owned_faces(&faces);
+}
+
+static int set_up_test_group(void **state)
+{
+    (void)state;
+    return enter_test_folder("patch_faults") ? 0 : 1;
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
-                                       cmocka_unit_test(patches_of_hexes_require_vertices)};
-    return run_session_tests(argc, argv, tests, NULL, NULL);
+                                       cmocka_unit_test(patches_of_hexes_require_vertices),
+                                       cmocka_unit_test(other_fields_are_drawn_if_a_patch_is_wrong)};
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

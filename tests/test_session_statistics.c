@@ -288,6 +288,91 @@ static void other_fields_are_found_if_a_field_is_missing(void **state)
     input_free(&in);
 }
 
+/* A field whose fill function fails, or whose index is out of range, on the last rank if is_wrong is set. */
+typedef struct faulty_field {
+    const session_input *in;
+    int64_t *index;
+    bool is_filled, is_wrong;
+} faulty_field;
+
+static insitu_status fill_faulty_field(void *data, insitu_field *field)
+{
+    const faulty_field *f = data;
+    field->count = f->in->field.count;
+    field->values = f->in->field.values;
+    return f->is_wrong ? INSITU_ERROR_IO : INSITU_OK;
+}
+
+static void set_faulty_field(insitu_session *session, faulty_field *f, bool is_wrong)
+{
+    const int64_t count = f->in->field.count;
+    insitu_field field = f->in->field;
+    field.name = "q";
+    f->is_wrong = is_wrong && own_rank == rank_count - 1;
+    for (int64_t v = 0; v < count; v++) f->index[v] = v;
+    if (f->is_filled) {
+        field.count = 0;
+        field.values.data = NULL;
+        field.fill = fill_faulty_field;
+        field.fill_data = f;
+    } else {
+        if (f->is_wrong) f->index[count - 1] = count;
+        field.index = (insitu_array){f->index, INSITU_INT64, 0};
+    }
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+}
+
+static int count_lines(const char *path)
+{
+    static char text[MOST];
+    int count = 0;
+    read_file(path, MOST, text);
+    for (const char *c = text; *c; c++) count += *c == '\n';
+    return own_rank == 0 ? count : 0;
+}
+
+/* Checks that statistics, conditions and images of f do not depend on an error in the values of q, also if statistics
+ * and images of q or of a field that is derived from q are requested in the same steps. */
+static void other_fields_are_found_if_values_are_invalid(void **state)
+{
+    (void)state;
+#define TWO(field)                                                                                                     \
+    "statistics: [{field: " field ", path: q.csv}, {field: f, path: p.csv}]\n" PICTURE(                                \
+        "    when: {field: f, above: -1e9}\n") "  - {name: b, size: [8, 6], when: {field: " field                      \
+                                               ", above: -1e9}, layers: [{isosurface: {field: f, values: [0.1]}}], "   \
+                                               "outputs: [{path: b.png}]}\n  - {name: c, size: [8, 6], layers: "       \
+                                               "[{isosurface: {field: " field                                          \
+                                               ", values: [0.1]}}], outputs: [{path: c.png}]}\n"
+    static const char *const scenes[] = {TWO("q"), "fields: {r: 2 * q}\n" TWO("r")};
+#undef TWO
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    faulty_field f = {.in = &in, .index = calloc((size_t)in.field.count + 1, sizeof *f.index)};
+    assert_non_null(f.index);
+    for (int i = 0; i < 4; i++) {
+        if (own_rank == 0) unlink("p.csv"), unlink("q.csv");
+        f.is_filled = i % 2;
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[i / 2]));
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
+        for (int cycle = 0; cycle < 3; cycle++) {
+            set_faulty_field(session, &f, cycle == 1);
+            discard_pictures();
+            const insitu_status status = insitu_step(session, cycle, cycle);
+            if (cycle == 1)
+                check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"q\": ",
+                                          f.is_filled ? "its fill returned 5" : "the index of vertex ");
+            else
+                everywhere(status == INSITU_OK);
+            everywhere(insitu_last_report(session)->images == (cycle == 1 ? 1 : 3));
+        }
+        insitu_destroy(&session);
+        everywhere(own_rank != 0 || (count_lines("p.csv") == 4 && count_lines("q.csv") == 3));
+    }
+    discard_pictures();
+    free(f.index);
+    input_free(&in);
+}
+
 /* ---- conditions ------------------------------------------------------------------------------------------------ */
 
 /* Makes steps with the cycles 0 to 9, in which the maximum of the field is the cycle. Returns the cycles that drew a
@@ -342,6 +427,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(restarted_runs_continue_the_file),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(other_fields_are_found_if_a_field_is_missing),
+                                       cmocka_unit_test(other_fields_are_found_if_values_are_invalid),
                                        cmocka_unit_test(conditions_suppress_images)};
     return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -3,6 +3,8 @@
  * A phase gets only the parts of the session that it may access. It is collective, and returns the same status on all
  * ranks (session_agree.h), so that all ranks leave the step after the same phase. The first phase is one small
  * reduction; if no image is due and nothing has failed, nothing else is exchanged. */
+#include <string.h>
+
 #include "cpu.h"
 #include "memory.h"
 #include "render.h"
@@ -96,43 +98,6 @@ static session_derive_basis make_derive_basis(insitu_session *s)
     return (session_derive_basis){&s->scene_file.scene, &s->catalogue, &s->meshes, &s->team, &s->space.extent};
 }
 
-/* Computes the derived fields that the step's statistics and conditions use. Collective; all ranks return the same
- * status. */
-static insitu_status derive_statistics_and_condition_fields(insitu_session *s, const session_moment *moment,
-                                                            bool images, base_error *error)
-{
-    const scene *scene = &s->scene_file.scene;
-    const uint64_t needed = session_find_derived_fields_of_events(scene, moment->cycle, images);
-    const session_derive_basis basis = make_derive_basis(s);
-    if (!needed) return INSITU_OK;
-    session_mark_source_fields(scene, needed, &s->meshes);
-    /* all ranks agree on the status here, because fill functions may be collective */
-    insitu_status status = session_agree(s->team.comm, error);
-    if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
-    if (!error->status) session_copy_requested_fields(&s->meshes, s->team.threads, error);
-    if (!status) status = session_agree(s->team.comm, error);
-    return status ? status : session_compute_derived(&basis, needed, error);
-}
-
-/* Computes the statistics that are due, and determines the images whose conditions hold. If one of them fails, the
- * others are still computed and images are still drawn; the error is returned afterwards. Collective. */
-static void update_statistics_and_conditions(insitu_session *s, session_plan_basis *basis, base_error *error)
-{
-    const session_moment *moment = basis->moment;
-    const session_event_time now = {moment->cycle, moment->time};
-    const bool images = session_count_due_images(basis->scene, moment) > 0;
-    s->events.held_conditions = 0;
-    if (session_are_any_statistics_needed(basis->scene, moment->cycle, images)) {
-        base_error own = {.status = INSITU_OK};
-        const session_valid_events valid = session_check_event_fields(basis, images, error);
-        if (derive_statistics_and_condition_fields(s, moment, images, &own) == INSITU_OK)
-            session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
-                                               &valid, &s->report, &own);
-        if (!error->status) *error = own;
-    }
-    basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);
-}
-
 static insitu_status add_derived_fields(insitu_session *s, base_error *error)
 {
     return session_add_derived_fields(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team,
@@ -221,20 +186,111 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
 }
 
-/* Makes the step's plan: the images to draw and the data that they need (session_plan.h). If fields turn out to be
- * invalid when their values are read, makes another plan without the images that use them. Collective. */
-static insitu_status plan_images_without_invalid_fields(insitu_session *s, const session_plan_basis *basis,
-                                                        base_error *refused, session_plan *plan, base_error *error)
+/* Updates the catalogue after a phase has failed because it found invalid values and stored the error with their field.
+ * Only what uses this field is left out of the step then. *error is cleared; *refused keeps the first error.
+ * Collective. */
+static insitu_status exclude_invalid_field(insitu_session *s, base_error *refused, base_error *error)
 {
-    insitu_status status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
-    if (status == INSITU_ERROR_FIELD || status == INSITU_ERROR_ARGUMENT) {
-        if (!refused->status) *refused = *error;
-        *error = (base_error){0};
-        session_restore_excluded(&s->meshes);
-        status = update_catalogue_and_mesh_groups(s, true, false, error);
-        if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
+    if (!refused->status) *refused = *error;
+    *error = (base_error){0};
+    session_restore_excluded(&s->meshes);
+    return update_catalogue_and_mesh_groups(s, true, false, error);
+}
+
+/* A phase that reads values of fields, and may therefore find that they are invalid. Collective. */
+typedef insitu_status phase_function(insitu_session *s, void *of, base_error *error);
+
+/* Runs a phase, again without each field that it finds to be invalid. It also ends if the phase fails twice with the
+ * same error, which then is not that of a field. Collective. */
+static insitu_status run_phase_without_invalid_fields(insitu_session *s, phase_function *phase, void *of,
+                                                      base_error *refused, base_error *error)
+{
+    base_error last = {.status = INSITU_OK};
+    insitu_status status = phase(s, of, error);
+    while ((status == INSITU_ERROR_FIELD || status == INSITU_ERROR_ARGUMENT) &&
+           strcmp(error->message, last.message) != 0) {
+        last = *error;
+        status = exclude_invalid_field(s, refused, error);
+        if (!status) status = phase(s, of, error);
     }
-    if (!status && refused->status) plan->refusal = *refused;
+    return status;
+}
+
+/* The input of read_statistics_and_condition_fields(), and its result `valid`. */
+typedef struct event_phase {
+    const session_plan_basis *basis;
+    bool images;
+    session_valid_events valid;
+    base_error *error; /* receives the first error of a field that does not exist or has an error */
+} event_phase;
+
+/* Reads the fields of the step's statistics and conditions, and computes those that are derived. All ranks return the
+ * same status. Collective. */
+static insitu_status read_statistics_and_condition_fields(insitu_session *s, void *of, base_error *error)
+{
+    event_phase *phase = of;
+    const scene *scene = phase->basis->scene;
+    const int64_t cycle = phase->basis->moment->cycle;
+    const uint64_t needed = session_find_derived_fields_of_events(scene, cycle, phase->images);
+    const session_derive_basis basis = make_derive_basis(s);
+    phase->valid = session_check_event_fields(phase->basis, phase->images, phase->error);
+    session_mark_source_fields(scene, needed, &s->meshes);
+    const insitu_status status =
+        session_read_event_fields(scene, &s->meshes, &s->catalogue, &s->team, cycle, &phase->valid, error);
+    return status ? status : session_compute_derived(&basis, needed, error);
+}
+
+/* Computes the statistics that are due, and determines the images whose conditions hold. If one of them fails, the
+ * others are still computed and images are still drawn; the error is returned afterwards. Collective. */
+static void update_statistics_and_conditions(insitu_session *s, session_plan_basis *basis, base_error *error)
+{
+    const session_moment *moment = basis->moment;
+    const session_event_time now = {moment->cycle, moment->time};
+    const bool images = session_count_due_images(basis->scene, moment) > 0;
+    s->events.held_conditions = 0;
+    if (session_are_any_statistics_needed(basis->scene, moment->cycle, images)) {
+        base_error own = {.status = INSITU_OK};
+        event_phase phase = {.basis = basis, .images = images, .error = error};
+        if (!run_phase_without_invalid_fields(s, read_statistics_and_condition_fields, &phase, error, &own))
+            session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
+                                               &phase.valid, &s->report, &own);
+        if (!error->status) *error = own;
+    }
+    basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);
+}
+
+/* Makes the meshes discontinuous whose fields at corners the scene uses (session_discontinuous.h). Collective. */
+static insitu_status make_meshes_discontinuous(insitu_session *s, void *of, base_error *error)
+{
+    (void)of;
+    return session_make_discontinuous(&s->meshes, &s->catalogue, &s->scene_file.scene, &s->team, error);
+}
+
+/* The input of plan_images(), and its result `plan`. */
+typedef struct plan_phase {
+    const session_plan_basis *basis;
+    session_plan *plan;
+} plan_phase;
+
+/* Makes the step's plan: the images to draw and the data that they need (session_plan.h). Then computes the derived
+ * fields and the values averaged at vertices that these images need. Collective. */
+static insitu_status plan_images(insitu_session *s, void *of, base_error *error)
+{
+    const plan_phase *phase = of;
+    const session_team *team = &s->team;
+    const session_extent *extent = &s->space.extent;
+    const session_derive_basis derived = make_derive_basis(s);
+    session_plan *plan = phase->plan;
+    session_plan_free(plan);
+    insitu_status status = session_make_plan(phase->basis, &s->meshes, team, &s->report, plan, error);
+    if (!status)
+        status =
+            session_compute_derived(&derived, session_find_derived_fields_of_plan(&s->scene_file.scene, plan), error);
+    if (!status &&
+        (plan->recentring_count || plan->surface_count || session_plan_has_smooth_normals(plan, &s->catalogue)))
+        status = session_update_home_ranks(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
+    if (!status)
+        status = session_recentre(plan->recentrings, plan->recentring_count, plan->stale, &s->meshes, team, error);
     return status;
 }
 
@@ -271,17 +327,11 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     };
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, moment, refused, error);
-    if (!status) status = session_make_discontinuous(&s->meshes, &s->catalogue, basis.scene, team, error);
+    if (!status) status = run_phase_without_invalid_fields(s, make_meshes_discontinuous, NULL, refused, error);
     if (!status) update_statistics_and_conditions(s, &basis, &of_events);
-    if (!status) status = plan_images_without_invalid_fields(s, &basis, refused, &plan, error);
-    const session_derive_basis derived = make_derive_basis(s);
     if (!status)
-        status = session_compute_derived(&derived, session_find_derived_fields_of_plan(basis.scene, &plan), error);
-    if (!status &&
-        (plan.recentring_count || plan.surface_count || session_plan_has_smooth_normals(&plan, &s->catalogue)))
-        status = session_update_home_ranks(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
-    if (!status)
-        status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);
+        status = run_phase_without_invalid_fields(s, plan_images, &(plan_phase){&basis, &plan}, refused, error);
+    if (!status && refused->status) plan.refusal = *refused;
     if (!status) status = session_find_smooth_gradients(&plan, &s->catalogue, &s->meshes, team, extent, error);
     if (!status) session_find_changed_values(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);

@@ -322,17 +322,22 @@ static bool update_groups_of_equal_vertices(recentring *r, int ranks)
     return session_update_vertex_groups(&basis, &mesh_group->groups);
 }
 
-/* Reads the values of boundary faces, one list per part. */
+/* Reads the values of boundary faces, one list per part. An error of a patch is stored with its field. */
 static void read_boundary_face_values(const recentring *r, session_patch_values *faces, base_error *error)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
     for (int i = 0; i < r->list.count && !error->status; i++) {
+        base_error own = {.status = INSITU_OK};
         const mesh_part *part = &r->parts[i];
         const session_vertex_numbers numbers = {&groups->keys, groups->group_of_vertex + groups->first_vertices[i],
                                                 r->mesh_group->by_id};
-        if (part->scalar)
-            session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers,
-                                      &faces[i], error);
+        if (!part->scalar) continue;
+        session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers, &faces[i],
+                                  &own);
+        if (own.status == INSITU_ERROR_FIELD || own.status == INSITU_ERROR_ARGUMENT)
+            session_store_problem(&r->list.items[i]->fields[part->scalar->field], &own, error);
+        else
+            *error = own;
     }
 }
 

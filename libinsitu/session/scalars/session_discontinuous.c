@@ -16,7 +16,7 @@ static bool is_field_at_corners(const session_mesh *mesh, const scene_field *fie
 {
     if (!scene_field_selects_mesh(field, mesh->name)) return false;
     const int index = session_find_field(mesh, field->name);
-    return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
+    return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER && !mesh->fields[index].problem.status;
 }
 
 static bool is_corner_field_used_by_image(const session_mesh *mesh, const scene_image *image)
@@ -156,6 +156,13 @@ static insitu_status update_discontinuous_mesh(session_meshes *meshes, session_m
     return is_discontinuous && !mesh->discontinuous.is_made ? make_discontinuous(mesh, threads, error) : INSITU_OK;
 }
 
+static void store_problem_with_corner_fields(session_mesh *mesh, const base_error *problem, base_error *first)
+{
+    for (int f = 0; f < mesh->field_count; f++)
+        if (mesh->fields[f].given.centring == INSITU_CORNER && !mesh->fields[f].problem.status)
+            session_store_problem(&mesh->fields[f], problem, first);
+}
+
 /* ---- making meshes discontinuous ------------------------------------------------------------------------------- */
 
 static bool has_any_corner_field(const session_catalogue *catalogue)
@@ -169,12 +176,17 @@ static bool has_any_corner_field(const session_catalogue *catalogue)
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error)
 {
-    for (int m = 0; m < meshes->count && !error->status; m++) {
+    for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
+        base_error own = {.status = INSITU_OK};
         /* if cells of higher order are evaluated at additional nodes (finer.parts), cells do not share nodes, and the
          * mesh need not be made discontinuous */
         const bool is_discontinuous = !mesh->finer.parts && is_corner_field_used_by_scene(mesh, scene);
-        if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
+        if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, &own);
+        if (own.status == INSITU_ERROR_FIELD)
+            store_problem_with_corner_fields(mesh, &own, error);
+        else if (!error->status)
+            *error = own;
     }
     return has_any_corner_field(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }

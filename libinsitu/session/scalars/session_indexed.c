@@ -222,18 +222,29 @@ static insitu_status update_requested_copy(session_mesh *mesh, int index, int th
     return check_index(mesh, field, &v, error);
 }
 
+/* Only an error of the field's values is stored with the field. Otherwise, as if memory has run out, the field remains
+ * valid, and images may still use it. */
+static void copy_requested_values(session_mesh *mesh, int index, int threads, base_error *error)
+{
+    base_error own = {.status = INSITU_OK};
+    if (mesh->fields[index].problem.status) return;
+    if (update_requested_copy(mesh, index, threads, &own) == INSITU_ERROR_FIELD)
+        session_store_problem(&mesh->fields[index], &own, error);
+    else if (!error->status)
+        *error = own;
+}
+
 insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error)
 {
-    insitu_status status = INSITU_OK;
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
-            const bool is_needed = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
-            if (is_needed && !status) status = update_requested_copy(mesh, f, threads, error);
+            if (mesh->fields[f].is_in_statistics || mesh->fields[f].is_source)
+                copy_requested_values(mesh, f, threads, error);
             mesh->fields[f].is_in_statistics = false;
         }
     }
-    return status;
+    return error->status;
 }
 
 static void copy_used_values(session_mesh *mesh, int index, int threads, base_error *error)

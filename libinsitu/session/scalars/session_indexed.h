@@ -15,7 +15,8 @@ void session_clear_statistics_marks(const session_meshes *meshes);
 /* Both functions copy values that have an index into the order of the mesh's vertices, cells or corners, unless the
  * copy is up to date. session_copy_requested_fields() copies the fields that statistics need, and clears their marks.
  * session_copy_used_fields() copies the fields of scalars that this step uses, and the fields from which derived fields
- * are computed. Both functions must be called before the values are read. Local. */
+ * are computed. If an index is invalid, the error is also stored in session_field.problem, and the other fields are
+ * still copied. Both functions must be called before the values are read. Local. */
 insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error);
 

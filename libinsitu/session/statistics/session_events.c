@@ -117,6 +117,22 @@ static void store_conditions(session_events *events, const scene *scene, const e
     }
 }
 
+insitu_status session_read_event_fields(const scene *scene, session_meshes *meshes, const session_catalogue *catalogue,
+                                        const session_team *team, int64_t cycle, const session_valid_events *valid,
+                                        base_error *error)
+{
+    event_work work;
+    if (!work_create(scene, cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
+    for (int i = 0; i < work.count; i++) session_mark_field_for_statistics(meshes, work.requests[i].field);
+    work_free(&work);
+    /* ranks agree on errors before fill functions are called, because fill functions may be collective */
+    insitu_status status = session_agree(team->comm, error);
+    if (status) return status;
+    session_fill_fields(meshes, catalogue, false, error);
+    session_copy_requested_fields(meshes, team->threads, error);
+    return session_agree(team->comm, error);
+}
+
 insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
                                                  const session_catalogue *catalogue, const session_team *team,
                                                  const session_event_time *now, const session_valid_events *valid,
@@ -124,12 +140,7 @@ insitu_status session_process_statistics_of_step(session_events *events, const s
 {
     event_work work;
     if (!work_create(scene, now->cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
-    for (int i = 0; i < work.count; i++) session_mark_field_for_statistics(meshes, work.requests[i].field);
-    /* ranks agree on errors before fill functions are called, because fill functions may be collective */
     insitu_status status = session_agree(team->comm, error);
-    if (!status) session_fill_fields(meshes, catalogue, false, error);
-    if (!error->status) session_copy_requested_fields(meshes, team->threads, error);
-    status = session_agree(team->comm, error);
     if (!status)
         status = session_find_statistics(meshes, catalogue, team, work.requests, work.count, work.results, error);
     if (!status) {

@@ -31,10 +31,17 @@ typedef struct session_valid_events {
 bool session_are_any_statistics_needed(const scene *scene, int64_t cycle, bool images);
 bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycle);
 
+/* Calls the fill functions of the fields that the events in `valid` use and of the source fields that are marked, and
+ * copies values that have an index. Invalid values are an error, which is also stored in session_field.problem; the
+ * other fields are still read. `valid` must be the same on all ranks. Collective. */
+insitu_status session_read_event_fields(const scene *scene, session_meshes *meshes, const session_catalogue *catalogue,
+                                        const session_team *team, int64_t cycle, const session_valid_events *valid,
+                                        base_error *error);
+
 /* Computes the statistics that are due and writes them to their files. Also computes the statistics on which images'
- * conditions depend, and stores which conditions hold. Only the events in `valid`, which must be the same on all ranks,
- * are processed. Warns of those that count no cell. If an event fails, the other events are still processed, and the
- * error is returned afterwards. Collective. */
+ * conditions depend, and stores which conditions hold. Only the events in `valid`, whose fields have been read, are
+ * processed. Warns of those that count no cell. If an event fails, the other events are still processed, and the error
+ * is returned afterwards. Collective. */
 insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
                                                  const session_catalogue *catalogue, const session_team *team,
                                                  const session_event_time *now, const session_valid_events *valid,
