@@ -1,7 +1,7 @@
 ! Structured blocks from Fortran: each form and layout draws the picture of the same cells handed over as hexes or quads, to
 ! the byte; what does not fit is a status and a text that says what was found and what was expected.
 module test_fortran_blocks
-    use, intrinsic :: iso_fortran_env, only: int8, int32, real32, real64, error_unit
+    use, intrinsic :: iso_fortran_env, only: int8, int16, int32, int64, real32, real64, error_unit
     use mpi_f08
     use insitu
     implicit none
@@ -29,6 +29,7 @@ contains
         call MPI_Comm_rank(MPI_COMM_WORLD, rank)
         call make_arrays()
         call hexes_are_drawn_by_blocks()
+        call integers_are_drawn_as_reals()
         call quads_are_drawn_by_blocks()
         call wrong_blocks_are_refused()
         call wrong_fields_are_refused()
@@ -157,6 +158,54 @@ contains
         values = insitu_borrow(with_layers(2:, :, :))
         own_status = INSITU_OK
     end subroutine fill_wrongly
+
+    ! Values of all kinds of integers, (i, j, k) and with components, draw the picture of the same values as reals.
+    subroutine integers_are_drawn_as_reals()
+        real(real64), target :: reals(n, n, n)
+        integer(int8), target :: i1(n, n, n), i1_before(2, n, n, n)
+        integer(int16), target :: i2(n, n, n), i2_before(2, n, n, n)
+        integer(int32), target :: i4(n, n, n), i4_before(2, n, n, n)
+        integer(int64), target :: i8(n, n, n), i8_before(2, n, n, n)
+        character(:), allocatable :: plain
+        type(insitu_session) :: s
+        reals = aint(2*f)
+        i8 = int(reals, int64)
+        i4 = int(i8, int32)
+        i2 = int(i8, int16)
+        i1 = int(i8, int8)
+        i8_before = 7
+        i8_before(1, :, :, :) = i8
+        i4_before = int(i8_before, int32)
+        i2_before = int(i8_before, int16)
+        i1_before = int(i8_before, int8)
+        call set_block_of_rank(s)
+        call s%set_field('m', 'p', insitu_borrow(reals), status)
+        plain = picture(s)
+        call expect(len(plain) > 300 .or. rank /= 0, 'the picture of reals shows something')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i1), plain, 'integers of 1 byte')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i2), plain, 'integers of 2 bytes')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i4), plain, 'integers of 4 bytes')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i8), plain, 'integers of 8 bytes')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i1_before), plain, 'components of 1 byte')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i2_before), plain, 'components of 2 bytes')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i4_before), plain, 'components of 4 bytes')
+        call set_block_of_rank(s)
+        call same(s, insitu_borrow(i8_before), plain, 'components of 8 bytes')
+    end subroutine integers_are_drawn_as_reals
+
+    subroutine set_block_of_rank(s)
+        type(insitu_session), intent(inout) :: s
+        real(real64), parameter :: spacing(3) = 1
+        call start(s)
+        call s%set_block('m', cells, status, spacing=spacing, first=[4*rank, 0, 0])
+    end subroutine set_block_of_rank
 
     subroutine hexes_are_drawn_by_blocks()
         type(insitu_session) :: s

@@ -228,14 +228,15 @@ module insitu
         procedure :: parameter => read_parameter
     end type insitu_session
 
-    ! Borrows an array of any kind that the library supports: reals and integers of 4 and 8 bytes, and integers of 1
-    ! byte. It is a list or a matrix: (corners, cells) for connectivity, (components, tuples) for values. For blocks it
-    ! may also be an array (i, j, k) and, for fields with components, (components, i, j, k) or (i, j, k, components).
+    ! Borrows an array of any kind that the library supports: reals of 4 and 8 bytes, and integers of 1, 2, 4
+    ! and 8 bytes. It is a list or a matrix: (corners, cells) for connectivity, (components, tuples) for values. For
+    ! blocks it may also be an array (i, j, k) and, for fields with components, (components, i, j, k) or (i, j, k,
+    ! components).
     interface insitu_borrow
         module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i2, borrow_i4, borrow_i8
         module procedure borrow_r4_2, borrow_r8_2, borrow_i1_2, borrow_i2_2, borrow_i4_2, borrow_i8_2
-        module procedure borrow_r4_3, borrow_r8_3, borrow_i1_3, borrow_i4_3, borrow_i8_3
-        module procedure borrow_r4_4, borrow_r8_4, borrow_i4_4, borrow_i8_4
+        module procedure borrow_r4_3, borrow_r8_3, borrow_i1_3, borrow_i2_3, borrow_i4_3, borrow_i8_3
+        module procedure borrow_r4_4, borrow_r8_4, borrow_i1_4, borrow_i2_4, borrow_i4_4, borrow_i8_4
     end interface insitu_borrow
 
     ! Borrows coordinates: a matrix (3, vertices), or x, y and z. If z is 0 everywhere: a matrix (2, vertices), or x and
@@ -481,6 +482,14 @@ contains
             c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
     end function borrow_i1_3
 
+    function borrow_i2_3(a) result(out)
+        integer(int16), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer16, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_i2_3
+
     function borrow_i4_3(a) result(out)
         integer(int32), intent(in), target :: a(:, :, :)
         type(insitu_array) :: out
@@ -514,6 +523,24 @@ contains
             c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
             c_loc(a(1, 1, 1, min(2, size(a, 4))))])
     end function borrow_r8_4
+
+    function borrow_i1_4(a) result(out)
+        integer(int8), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(bytes, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_i1_4
+
+    function borrow_i2_4(a) result(out)
+        integer(int16), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer16, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_i2_4
 
     function borrow_i4_4(a) result(out)
         integer(int32), intent(in), target :: a(:, :, :, :)
