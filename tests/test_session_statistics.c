@@ -234,6 +234,35 @@ static void restarted_runs_continue_the_file(void **state)
     input_free(&in);
 }
 
+/* Checks that a run that goes back in time within a session replaces the lines of the cycles that it repeats, in files
+ * of different intervals. */
+static void repeated_cycles_replace_their_lines(void **state)
+{
+    (void)state;
+    static const char scene[] =
+        NEVER "statistics: [{field: f, path: all.csv}, {field: f, path: third.csv, every: 3}]\n";
+    static const int cycles[] = {0, 1, 2, 3, 3, 4, 5, 6, 2, 3, 4, 4};
+    static char expected[2][MOST], text[MOST];
+    static const char *const paths[] = {"all.csv", "third.csv"};
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    if (own_rank == 0) unlink(paths[0]), unlink(paths[1]);
+    run_steps(scene, &in, 0, 5);
+    for (int i = 0; i < 2; i++) read_file(paths[i], MOST, expected[i]);
+    if (own_rank == 0) unlink(paths[0]), unlink(paths[1]);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int i = 0; i < (int)(sizeof cycles / sizeof cycles[0]); i++) {
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
+        everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
+    }
+    insitu_destroy(&session);
+    for (int i = 0; i < 2; i++) {
+        read_file(paths[i], MOST, text);
+        everywhere(own_rank != 0 || (*text && strcmp(text, expected[i]) == 0));
+    }
+    input_free(&in);
+}
+
 /* Checks files that cannot be written: the error is returned on all ranks, and the picture is still drawn. */
 static void files_that_cannot_be_written_are_reported(void **state)
 {
@@ -425,6 +454,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
                                        cmocka_unit_test(zeros_are_written_without_a_sign),
                                        cmocka_unit_test(restarted_runs_continue_the_file),
+                                       cmocka_unit_test(repeated_cycles_replace_their_lines),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(other_fields_are_found_if_a_field_is_missing),
                                        cmocka_unit_test(other_fields_are_found_if_values_are_invalid),

@@ -282,7 +282,8 @@ DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
     X(TEXT("path", REQUIRED, scene_file_statistics, path, 1023),                                                       \
       .help = "File to write, ending in `.csv`. The path is relative to the working directory of rank 0. Missing "     \
               "folders are made. If a run begins in a folder that already has the file, the lines of its first cycle " \
-              "and of later cycles are removed, and the run continues the file.")                                      \
+              "and of later cycles are removed, and the run continues the file. The same happens if a run goes back "  \
+              "in time.")                                                                                              \
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_statistics, every),                                            \
       .help = "Write at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)  \
     X(CYAML_FIELD_MAPPING_PTR("histogram", OPTIONAL, scene_file_statistics, histogram, histogram_fields),              \
@@ -303,7 +304,7 @@ static const cyaml_schema_value_t statistics = {
       .help = "Draw at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)   \
     X(CYAML_FIELD_FLOAT_PTR("every_time", OPTIONAL, scene_file_image, every_time),                                     \
       .help = "Draw at the first step, and whenever the time has passed a multiple of this number since the previous " \
-              "step. Not allowed with `every`.",                                                                       \
+              "step. A step is also drawn if its time or that of the previous step is NaN. Not allowed with `every`.", \
       .default_text = "by `every`", .low = 0, .is_low_excluded = true, .high = 1e30)                                   \
     X(CYAML_FIELD_MAPPING_PTR("when", OPTIONAL, scene_file_image, when, condition_fields),                             \
       .help = "Draw only in those steps of `every` or `every_time` in which this condition holds.",                    \

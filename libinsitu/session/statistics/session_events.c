@@ -66,10 +66,13 @@ static bool condition_holds(const scene_condition *c, const session_statistics *
     return s->cell_count > 0 && value > c->above && value < c->below;
 }
 
-/* Writes all statistics that are due, even if some cannot be written. *error receives the first error. */
+/* Writes all statistics that are due, even if some cannot be written. *error receives the first error. If the run goes
+ * back in time, every file is treated as at the start of a session, so that its lines of later cycles are removed. */
 static void write_due_statistics(session_events *events, const scene *scene, const event_work *w,
                                  const session_event_time *now, base_error *error)
 {
+    if (now->cycle <= events->last_cycle) events->begun_files = 0;
+    events->last_cycle = now->cycle;
     for (int i = 0; i < w->count; i++) {
         const int at = w->request_origins[i];
         base_error own = {.status = INSITU_OK};

@@ -12,10 +12,13 @@ typedef struct session_event_time {
     double time;
 } session_event_time;
 
-/* State of the session over its steps. Each member has one bit for each of the statistics or images of the scene file,
- * of which there are at most 64 each. All variants of an image share one bit. */
+/* State of the session over its steps. Each set has one bit for each of the statistics or images of the scene file, of
+ * which there are at most 64 each. All variants of an image share one bit. */
 typedef struct session_events {
-    uint64_t begun_files;     /* statistics for which this session has written a line to the file */
+    uint64_t begun_files; /* statistics for which a line has been written since the session or the run's last return to
+                           * an earlier cycle */
+    int64_t
+        last_cycle; /* last cycle at which statistics were written or conditions checked; unused if begun_files is 0 */
     uint64_t held_conditions; /* images whose condition holds in this step */
     uint64_t drawn_images;    /* images that have been drawn by this session */
 } session_events;

@@ -86,7 +86,7 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
     return INSITU_OK;
 }
 
-/* Writes a line to a file to which this session has not written yet, or which was removed since. */
+/* Writes a line to a file of which lines may have to be removed, or which does not exist. */
 static insitu_status rewrite_file_with_kept_lines(const char *path, new_lines *lines, base_error *error)
 {
     file_content old;
