@@ -968,8 +968,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(blocks_that_do_not_fit_are_reported),
                                        cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell),
                                        cmocka_unit_test(gradients_merge_vertices_that_differ_in_last_bits),
-                                       cmocka_unit_test(gradients_ignore_given_values_at_hanging_vertices)};
-    cmocka_unit_test(values_are_interpolated_on_edges_of_quads)
-};
-return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
+                                       cmocka_unit_test(gradients_ignore_given_values_at_hanging_vertices),
+                                       cmocka_unit_test(values_are_interpolated_on_edges_of_quads)};
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -322,8 +322,8 @@ typedef struct insitu_mesh {
  * position are treated as one vertex if one layer shows the field on these meshes and they have no vertex ids. A vertex
  * that hangs on a triangle or quad of a larger cell, or on an edge of a larger cell that is a triangle or quad, gets
  * the value that is interpolated there. On a mesh with levels of refinement (insitu_lattice), hanging vertices get this
- * value even if the field has values at vertices, but statistics, conditions and thresholds use the given values. If the
- * field has values on the boundary (insitu_patch), a vertex there gets the mean of these values instead.
+ * value even if the field has values at vertices, but statistics, conditions and thresholds use the given values. If
+ * the field has values on the boundary (insitu_patch), a vertex there gets the mean of these values instead.
  *
  * Corner fields may differ from cell to cell at a shared vertex, as in discontinuous Galerkin methods. A corner field
  * has one value for each vertex of each cell, in the order of the caller's connectivity (see corner_row). Each cell
