@@ -289,7 +289,7 @@ typedef struct face_list {
     int64_t count, capacity;
     found_face *faces;
     session_key *keys;
-    bool is_out_of_memory; /* set if memory ran out */
+    bool is_out_of_memory; /* set once memory has run out; the list then lacks faces, even if there is memory again */
 } face_list;
 
 static void face_list_free(face_list *list)
@@ -300,7 +300,7 @@ static void face_list_free(face_list *list)
 
 static bool face_list_reserve(face_list *list)
 {
-    if (list->count < list->capacity) return true;
+    if (list->count < list->capacity || list->is_out_of_memory) return !list->is_out_of_memory;
     const int64_t capacity = list->capacity * 2 + 1024;
     found_face *faces = base_realloc(list->faces, (size_t)capacity * sizeof *faces);
     if (faces) list->faces = faces;
