@@ -245,10 +245,11 @@ static void add_frame_to_report(insitu_report *report, const session_frame *fram
 static void warn_of_overlaps(session_report *report, const scene_image *image, int64_t pixels)
 {
     const session_warning warning = {WARNING_OVERLAP, image->name, NULL, 0};
-    session_warn(
-        report, &warning, pixels > 0,
-        "image \"%s\": %lld pixels where cells overlap: each cell adds its own volume (are ghost cells flagged?)",
-        image->name, (long long)pixels);
+    session_warn(report, &warning, pixels > 0,
+                 "image \"%s\": %lld pixels where cells overlap, so that each adds its own volume (are ghost cells "
+                 "flagged?), or "
+                 "where a surface of another mesh lies within cells",
+                 image->name, (long long)pixels);
 }
 
 /* The input and results of drawing the frames of an image. */

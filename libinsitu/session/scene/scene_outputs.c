@@ -310,8 +310,10 @@ static insitu_status report_repeated_output_file(const scene_document *d, const 
     if (a->source != b->source || first->output != second->output)
         return scene_fail_at_key(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
     const char *word = find_distinguishing_placeholder(a, b);
-    return scene_fail_at_key(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern,
-                             word, word);
+    char placeholder[32];
+    snprintf(placeholder, sizeof placeholder, "{%s", word);
+    return scene_fail_at_key(d, path, "path", "\"%.100s\" is one file for several %ss, expected %s{%s} in it", pattern,
+                             word, strstr(pattern, placeholder) ? "more digits of " : "", word);
 }
 
 static const scene_output *get_output_of_file(const scene *s, const written_file *file)

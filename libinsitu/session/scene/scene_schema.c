@@ -85,7 +85,8 @@ DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
       .low = 1, .high = 4096)                                                                                          \
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
       .help = "If true, volumes are the same to the last bit on any number of ranks and any partition, if no cells "   \
-              "overlap. Otherwise they are the same to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank. "   \
+              "overlap and no surface of another mesh, such as a shell, lies within them. Otherwise they are the "     \
+              "same to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank. "                                   \
               "On eight ranks it takes twice the time, because ranks send five times as many fragments to each "       \
               "other. Several volumes are drawn sample by sample or segment by segment, which is much slower.",        \
       .default_text = "`false`")                                                                                       \
@@ -365,9 +366,9 @@ static const cyaml_schema_value_t statistics = {
       .help =                                                                                                          \
           "Words, bars and lines in addition to the data. None of them lies over another, and all of them grow with "  \
           "the picture. What is too large is wrapped or made smaller, and bars may be placed in several columns. "     \
-          "Anything for which there is no space at all is left out, and the report names it. Words need a font: "      \
-          "DejaVuSans, or another "                                                                                    \
-          "common one. It is looked for in the folders that OPENIMAGEIO_FONTS names in rank 0's environment, and "     \
+          "Anything for which there is no space at all is left out, and the report names it, except the numbers of "   \
+          "rulers. Words need a font: DejaVuSans, or another common one. It is looked for in the folders that "        \
+          "OPENIMAGEIO_FONTS names in rank 0's environment, and "                                                      \
           "otherwise in the system's folders. The report warns if there is no font, or none in the folders named. "    \
           "Words are UTF-8; a character that the font lacks is a box, and the report names it.",                       \
       .default_text = "none", .child = &decorations_mapping)                                                           \
