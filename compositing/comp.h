@@ -48,8 +48,9 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
 
 /* Blends one pixel's fragments in place over background, like comp_merge_pixel(), for pictures whose volume fragments
  * are folded. Folding combines all volume fragments in an interval of the ray into one, in an order that depends only
- * on the ray (fragment_fold.h). Ranks may have folded a part of the fragments; this function folds the remaining
- * ones. Local. */
+ * on the ray (fragment_fold.h). Ranks may have folded a part of the fragments; this function folds the remaining ones.
+ * Unlike there, a surface is placed in front of a segment that ends behind it and begins in front of it by no more than
+ * the rounding error of a crossing, because the surface then lies on the face at which the segment begins. Local. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth);
 

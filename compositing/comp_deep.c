@@ -45,8 +45,8 @@ static void add_interval(void *state, const fragment *f)
     list->samples[list->sample_count++] = sample;
 }
 
-/* Moves the begins of samples so that none is in front of the end of the previous sample. Only rounding places it
- * there: a segment may begin slightly in front of the surface at which it begins (comp_merge_folded_pixel()). */
+/* Moves the begins of samples so that none is in front of the end of the previous sample. Rounding may place the begin
+ * of a segment slightly in front of the surface that precedes it (comp_merge_folded_pixel()). */
 static void separate_samples(insitu_deep_sample *samples, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {

@@ -27,8 +27,8 @@ typedef struct comp_deep_list {
 
 /* Adds the samples of one pixel. Its fragments must be in the order of comp_merge_pixel(). If is_folded is set, ranks
  * have blended several fragments of a volume into one (fragment_fold.h), and the order is that of
- * comp_merge_folded_pixel(). Each sample's z and z_back are the values of t at which its fragment begins and ends. If
- * memory runs out, lacks_memory is set. Local. */
+ * comp_merge_folded_pixel(). Each sample's z and z_back are the values of t at which its fragment begins and ends,
+ * but never less than the previous sample's z_back. If memory runs out, lacks_memory is set. Local. */
 void comp_deep_add_pixel(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
 /* Frees the lists' samples. The pointers in a list may be NULL. */

@@ -1202,6 +1202,11 @@ static const struct bad_file {
      "    sweep: {isovalues: true}",
      14,
      {"outputs[0].path: \"a.png\" is one file for several isovalues", "{isovalue}"}},
+    {15,
+     "  - name: c\n    sweep: {isovalues: true}\n    layers: [{isosurface: {field: f, values: [1, 1.2]}}]\n"
+     "    outputs: [{path: \"c{isovalue:.0f}.png\"}]\n  - name: b",
+     18,
+     {"outputs[0].path: \"c{isovalue:.0f}.png\" is one file for several isovalues", "more digits of {isovalue}"}},
     {6, "    sweep: {fields: [f, g]}", 14, {"outputs[0].path: \"a.png\" is one file for several fields", "{field}"}},
     {6, "    sweep: {fields: [f, f]}", 6, {"sweep.fields[1]: \"f\" is there twice"}},
     {6, "    sweep: {fields: [f, a/b]}", 6, {"sweep.fields[1]: \"a/b\" holds a /"}},

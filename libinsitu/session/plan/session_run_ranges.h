@@ -19,7 +19,7 @@
 typedef struct session_run_range {
     const char *kind; /* type of the layer, as written in the file of ranges: isosurface, surface, slice or volume */
     /* index of the layer, from 0, among the image's layers of this type that show the same component of the same field
-     * and have a range over the run, so that it does not change if other layers are added */
+     * and have a range over the run, so that it does not change if layers of other fields are added */
     int number;
     const scene_field *field;
     const scene_colour_map *map;

@@ -84,11 +84,12 @@ DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
       .help = "Number of frames with different jitter that are averaged into the image.", .default_text = "`1`",       \
       .low = 1, .high = 4096)                                                                                          \
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
-      .help = "If true, volumes are the same to the last bit on any number of ranks and any partition, if no cells "   \
-              "overlap and no surface of another mesh, such as a shell, lies within them. Otherwise they are the "     \
-              "same to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank. "                                   \
-              "On eight ranks it takes twice the time, because ranks send five times as many fragments to each "       \
-              "other. Several volumes are drawn sample by sample or segment by segment, which is much slower.",        \
+      .help =                                                                                                          \
+          "If true, volumes are the same to the last bit on any number of ranks and any partition. Otherwise they "    \
+          "are the same to 1e-6. Both hold unless cells overlap or a surface of another mesh, such as a shell, lies "  \
+          "within them. A volume takes 1.1 to 1.6 times the time on one rank. On eight ranks it takes twice the "      \
+          "time, because ranks send five times as many fragments to each other. Several volumes are drawn sample by "  \
+          "sample or segment by segment, which is much slower.",                                                       \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
       .help = "The longest time that the samples of an image may take, in seconds. The time is estimated before the "  \
