@@ -210,14 +210,14 @@ typedef struct kernel_placement {
     float near, far, along;
 } kernel_placement;
 
-/* Sets the bits of one vector of planes in the masks `below` and `above` of the placement. v: index of the vector; low,
- * high: the body's least and greatest signed distance from each plane. If the vector has the lane of depths, `near` and
- * `far` are set too. */
-SIMD_INLINE void kernel_placement_set_plane_bits(kernel_placement *placement, int v, vf low, vf high)
+/* Sets the bits of one vector of planes in the masks `below` and `above` of the placement. vector: index of the vector;
+ * low, high: the body's least and greatest signed distance from each plane. If the vector has the lane of depths,
+ * `near` and `far` are set too. */
+SIMD_INLINE void kernel_placement_set_sides_of_planes(kernel_placement *placement, int vector, vf low, vf high)
 {
-    placement->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
-    placement->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
-    if (v != KERNEL_DEPTH_LANE / SIMD_WIDTH) return;
+    placement->below |= vm_bits(vf_le(low, vf_set(0))) << vector * SIMD_WIDTH;
+    placement->above |= vm_bits(vf_le(vf_set(0), high)) << vector * SIMD_WIDTH;
+    if (vector != KERNEL_DEPTH_LANE / SIMD_WIDTH) return;
     placement->near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
     placement->far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
 }
@@ -243,7 +243,7 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
         const vf at =
             (q->normal[0][v] * middle[0] + q->normal[1][v] * middle[1]) + (q->normal[2][v] * middle[2] + q->offset[v]);
         const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
-        kernel_placement_set_plane_bits(&placement, v, at - reach, at + reach);
+        kernel_placement_set_sides_of_planes(&placement, v, at - reach, at + reach);
         if (v == KERNEL_ALONG_LANE / SIMD_WIDTH) placement.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
     }
     kernel_placement_find_blocks(&placement);
@@ -272,8 +272,8 @@ SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, con
             high = vf_max(high, at);
         }
         const vf size = (q->size[0][v] * most[0] + q->size[1][v] * most[1]) + (q->size[2][v] * most[2] + q->error[v]);
-        kernel_placement_set_plane_bits(&placement, v, low - size * KERNEL_OUTLINE_PAD,
-                                        high + size * KERNEL_OUTLINE_PAD);
+        kernel_placement_set_sides_of_planes(&placement, v, low - size * KERNEL_OUTLINE_PAD,
+                                             high + size * KERNEL_OUTLINE_PAD);
     }
     kernel_placement_find_blocks(&placement);
     return placement;

@@ -151,10 +151,11 @@ SIMD_INLINE vm kernel_local_exceeds_bounded_values(const kernel_local_bounds *b,
 
 /* Parameters of the functions below. They describe the errors of one segment that replaces a ray's whole interval in
  * its cell:
- *     mean            mean of |v - f| (top of this file); with n segments it is divided by n^2
+ *     mean            mean of |v - f|, the magnitude of the field's error; with n segments it is divided by n^2
  *     quartic         E, the bound of the quartic part of the field's deviation from its chord
  *     residual_error  error of the field that the residual of Newton's method causes
- *     weight_change   oscillation of T g that the changes of T and b along the segment cause */
+ *     weight_change   how much the weight T g of the field's error (top of this file) varies along the segment, because
+ *                     the transmittance T and the light from behind, b, change there */
 
 /* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of
  * the part of v - f (segment minus field) that has mean zero, plus the effect of the errors of the segment's mean. */

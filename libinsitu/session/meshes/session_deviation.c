@@ -170,7 +170,7 @@ static void extend_range_by_cell_values(const deviation_work *w, const session_b
  * number, so that sums over cells do not depend on their order. size: the size of a pixel. */
 static int64_t estimate_area(const session_cell_bound *bound, const session_nodes *of, double size)
 {
-    /* area V / (4 B) of regular cells whose edges have the length 1, by cell type; V and B are explained above */
+    /* for regular cells whose edges have the length 1: a quarter of the mean area of a plane's part in the cell */
     static const double tet = 0.032, pyramid = 0.055, wedge = 0.09, hex = 0.167;
     const int type = of->type;
     const double share = type == GRID_TET ? tet : type == GRID_PYRAMID ? pyramid : type == GRID_WEDGE ? wedge : hex;

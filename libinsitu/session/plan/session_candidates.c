@@ -61,7 +61,7 @@ static bool add_visible_intervals(session_scalar *scalar, const scene_volume *la
     return scalar->needs_all_cells || add_intervals(scalar, intervals, count);
 }
 
-static bool mark_data_of_volume(session_mesh *mesh, const scene_volume *layer)
+static bool mark_data_needed_by_volume(session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
@@ -79,7 +79,7 @@ static bool mark_distance_from_plane(session_mesh *mesh, const scene_plane *plan
            add_intervals(scalar, &(mmbvh_interval){-reach, reach}, 1);
 }
 
-static bool mark_data_of_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
+static bool mark_data_needed_by_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
 {
     session_scalar *colour, *lines;
     bool is_marked = session_mark_scalar(mesh, &layer->field, false, &colour);
@@ -90,7 +90,7 @@ static bool mark_data_of_slice(session_mesh *mesh, const scene_slice *layer, con
     return is_marked;
 }
 
-static bool mark_data_of_outer_surface(session_mesh *mesh, const scene_surface *layer)
+static bool mark_data_needed_by_outer_surface(session_mesh *mesh, const scene_surface *layer)
 {
     session_scalar *scalar;
     if (!session_is_surface_on_mesh(layer, mesh)) return true;
@@ -99,31 +99,32 @@ static bool mark_data_of_outer_surface(session_mesh *mesh, const scene_surface *
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
-static bool mark_data_of_isosurface(session_mesh *mesh, const scene_isosurface *layer, int height)
+static bool mark_data_needed_by_isosurface(session_mesh *mesh, const scene_isosurface *layer, int height)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
     if (!scalar) return true;
     if (mesh->has_shells_alone) {
         const scene_surface shells = session_make_shell_layer(layer, height);
-        return mark_data_of_outer_surface(mesh, &shells);
+        return mark_data_needed_by_outer_surface(mesh, &shells);
     }
     if (!add_isovalue_intervals(scalar, layer)) return false;
     if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
-static bool mark_data_of_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
+/* Marks the scalars of the mesh that the image needs. Returns false if memory runs out. */
+static bool mark_data_needed_by_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
 {
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++)
-        is_marked = mark_data_of_isosurface(mesh, &image->isosurfaces[i], image->height);
+        is_marked = mark_data_needed_by_isosurface(mesh, &image->isosurfaces[i], image->height);
     for (int i = 0; i < image->volume_count && is_marked; i++)
-        is_marked = mark_data_of_volume(mesh, &image->volumes[i]);
+        is_marked = mark_data_needed_by_volume(mesh, &image->volumes[i]);
     for (int i = 0; i < image->surface_count && is_marked; i++)
-        is_marked = mark_data_of_outer_surface(mesh, &image->surfaces[i]);
+        is_marked = mark_data_needed_by_outer_surface(mesh, &image->surfaces[i]);
     for (int i = 0; i < image->slice_count && is_marked; i++)
-        is_marked = mark_data_of_slice(mesh, &image->slices[i], extent);
+        is_marked = mark_data_needed_by_slice(mesh, &image->slices[i], extent);
     return is_marked;
 }
 
@@ -143,7 +144,7 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
             mesh->scalars[i].interval_count = 0;
         }
         for (int i = 0; i < count && mesh->is_given; i++)
-            if (images[i]->variant.view == 0 && !mark_data_of_image(mesh, images[i], extent)) return false;
+            if (images[i]->variant.view == 0 && !mark_data_needed_by_image(mesh, images[i], extent)) return false;
         session_drop_unused_outer_surfaces(mesh);
     }
     return true;
