@@ -263,6 +263,39 @@ static void repeated_cycles_replace_their_lines(void **state)
     input_free(&in);
 }
 
+/* Checks that lines of an abandoned branch are removed if the run went back to a cycle in which nothing was due, and if
+ * it went back several times before the next line. */
+static void returns_between_lines_remove_abandoned_lines(void **state)
+{
+    (void)state;
+    static const char scene[] =
+        NEVER "statistics: [{field: f, path: tens.csv, every: 10}, {field: f, path: sevens.csv, every: 7}]\n";
+    static const int cycles[] = {10, 14, 20, 21, 30, 15, 18, 18, 40, 49, 50};
+    static const char *const paths[] = {"tens.csv", "sevens.csv"};
+    static const int expected[2][3] = {{10, 40, 50}, {14, 49, -1}};
+    static char text[MOST];
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    if (own_rank == 0) unlink(paths[0]), unlink(paths[1]);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int i = 0; i < (int)(sizeof cycles / sizeof cycles[0]); i++) {
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
+        everywhere(insitu_step(session, cycles[i], cycles[i]) == INSITU_OK);
+    }
+    insitu_destroy(&session);
+    for (int i = 0; i < 2; i++) {
+        read_file(paths[i], MOST, text);
+        bool is_right = true;
+        const char *line = strchr(text, '\n');
+        for (int k = 0; k < 3 && expected[i][k] >= 0 && is_right; k++) {
+            is_right = line && atoi(line + 1) == expected[i][k];
+            line = line ? strchr(line + 1, '\n') : NULL;
+        }
+        everywhere(own_rank != 0 || (is_right && line && !line[1]));
+    }
+    input_free(&in);
+}
+
 /* Checks files that cannot be written: the error is returned on all ranks, and the picture is still drawn. */
 static void files_that_cannot_be_written_are_reported(void **state)
 {
@@ -455,6 +488,8 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(zeros_are_written_without_a_sign),
                                        cmocka_unit_test(restarted_runs_continue_the_file),
                                        cmocka_unit_test(repeated_cycles_replace_their_lines),
+                                       cmocka_unit_test(returns_between_lines_remove_abandoned_lines),
+                                       cmocka_unit_test(returns_between_lines_remove_abandoned_lines),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(other_fields_are_found_if_a_field_is_missing),
                                        cmocka_unit_test(other_fields_are_found_if_values_are_invalid),

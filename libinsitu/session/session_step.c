@@ -368,6 +368,7 @@ static insitu_status run_phases_of_step(insitu_session *s, session_changes *chan
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
     s->last_time = changes->time;
+    if (!status) session_record_cycle(&s->events, changes->cycle);
     const bool are_images_due = session_count_due_images(&s->scene_file.scene, &moment) > 0;
     if (status) return status;
     if (!(are_images_due || session_are_any_statistics_needed(&s->scene_file.scene, moment.cycle, false))) {

@@ -616,6 +616,7 @@ enum { SCENE_FINER_MEMORY = 4096 };
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a
  * step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
+enum { SCENE_MAX_STATISTICS = 64 }; /* maximum number of statistics that a scene file writes to files */
 
 /* A named number in the scene that the simulation can read (insitu_parameter()). */
 typedef struct scene_parameter {
@@ -662,7 +663,7 @@ typedef struct scene {
     scene_database *databases;
     int montage_count;
     scene_montage *montages;
-    int statistics_count; /* number of statistics that are written to files, 0 .. 64 */
+    int statistics_count; /* number of statistics that are written to files, 0 .. SCENE_MAX_STATISTICS */
     scene_statistics *statistics;
     int parameter_count; /* number of parameters, 0 .. 64; their names differ */
     scene_parameter *parameters;

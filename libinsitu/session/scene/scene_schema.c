@@ -520,7 +520,7 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
       .default_text = "`4096`", .low = 0, .is_low_excluded = true, .high = 1e12)                                       \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
       .help = "The images to draw.", .child = &image_mapping)                                                          \
-    X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
+    X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, SCENE_MAX_STATISTICS),       \
       .help =                                                                                                          \
           "Statistics of fields. Each entry writes one file with one line per step. A line has the cycle, the "        \
           "time, the number of cells, their volume, the least and the greatest value, the mean and the standard "      \

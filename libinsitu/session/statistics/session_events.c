@@ -4,7 +4,6 @@
 #include "session_agree.h"
 #include "session_filled.h"
 #include "session_indexed.h"
-#include "session_statistics_file.h"
 
 bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycle)
 {
@@ -66,19 +65,29 @@ static bool condition_holds(const scene_condition *c, const session_statistics *
     return s->cell_count > 0 && value > c->above && value < c->below;
 }
 
-/* Writes all statistics that are due, even if some cannot be written. *error receives the first error. If the run goes
- * back in time, every file is treated as at the start of a session, so that its lines of later cycles are removed. */
+void session_record_cycle(session_events *events, int64_t cycle)
+{
+    const bool is_return = events->has_cycle && cycle <= events->last_cycle;
+    for (int i = 0; i < SCENE_MAX_STATISTICS && (is_return || !events->has_cycle); i++) {
+        const bool is_pending = events->has_cycle && !(events->begun_files >> i & 1);
+        if (!is_pending || cycle < events->first_cycles[i]) events->first_cycles[i] = cycle;
+    }
+    if (is_return) events->begun_files = 0;
+    events->has_cycle = true;
+    events->last_cycle = cycle;
+}
+
+/* Writes all statistics that are due, even if some cannot be written. *error receives the first error. */
 static void write_due_statistics(session_events *events, const scene *scene, const event_work *w,
                                  const session_event_time *now, base_error *error)
 {
-    if (now->cycle <= events->last_cycle) events->begun_files = 0;
-    events->last_cycle = now->cycle;
     for (int i = 0; i < w->count; i++) {
         const int at = w->request_origins[i];
         base_error own = {.status = INSITU_OK};
         if (at >= scene->statistics_count || w->results[i].cell_count == 0) continue;
-        session_write_statistics(scene->statistics[at].path, !(events->begun_files >> at & 1), now->cycle, now->time,
-                                 &w->results[i], &own);
+        const bool is_first = !(events->begun_files >> at & 1);
+        const int64_t kept_below = is_first ? events->first_cycles[at] : now->cycle;
+        session_write_statistics(scene->statistics[at].path, is_first, kept_below, now, &w->results[i], &own);
         if (!own.status) events->begun_files |= (uint64_t)1 << at;
         if (own.status && !error->status) *error = own;
     }

@@ -6,19 +6,20 @@
 #include "session_catalogue.h"
 #include "session_report.h"
 #include "session_statistics.h"
-
-typedef struct session_event_time {
-    int64_t cycle;
-    double time;
-} session_event_time;
+#include "session_statistics_file.h"
 
 /* State of the session over its steps. Each set has one bit for each of the statistics or images of the scene file, of
  * which there are at most 64 each. All variants of an image share one bit. */
 typedef struct session_events {
-    uint64_t begun_files; /* statistics for which a line has been written since the session or the run's last return to
-                           * an earlier cycle */
-    int64_t
-        last_cycle; /* last cycle at which statistics were written or conditions checked; unused if begun_files is 0 */
+    /* statistics for which a line has been written since the session began or the run last went back in time */
+    uint64_t begun_files;
+    /* For each of the statistics: the file's lines of this cycle and of later ones are removed before its next line is
+     * written. It is the lowest of the cycles with which the session began, or to which the run went back, after the
+     * file's last line. Unused if the statistics are in begun_files. */
+    int64_t first_cycles[SCENE_MAX_STATISTICS];
+    /* has_cycle: set after the first step; last_cycle: cycle of the last step, whether or not anything was due */
+    bool has_cycle;
+    int64_t last_cycle;
     uint64_t held_conditions; /* images whose condition holds in this step */
     uint64_t drawn_images;    /* images that have been drawn by this session */
 } session_events;
@@ -28,6 +29,10 @@ typedef struct session_events {
 typedef struct session_valid_events {
     uint64_t statistics, images;
 } session_valid_events;
+
+/* Records the cycle of a step. Must be called in every step, because a run may go back in time to a cycle in which no
+ * statistics are due. A step that repeats the last cycle also counts as going back. Local. */
+void session_record_cycle(session_events *events, int64_t cycle);
 
 /* Returns whether the step needs statistics. images: true if the step may draw images, so that statistics for their
  * conditions are needed. Local. */

@@ -31,8 +31,8 @@ typedef struct new_lines {
     char *kept_text;    /* the lines of the old file that are kept */
     size_t kept_bytes;  /* size of kept_text in bytes */
     const char *header; /* line of column names; NULL: the file already has one */
-    int64_t cycle;
-    double time;
+    int64_t kept_below; /* lines of this cycle and of later cycles are removed */
+    session_event_time now;
     const session_statistics *values;
 } new_lines;
 
@@ -50,8 +50,9 @@ static void write_line(text_output *out, const new_lines *n)
     const session_statistics *v = n->values;
     const int digits = count_digits_to_resolve_range(v->minimum, v->maximum),
               of_bins = count_digits_to_resolve_range(v->low, v->high);
-    text_print(out, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
-               v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean, v->deviation);
+    text_print(out, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->now.cycle, n->now.time,
+               (long long)v->cell_count, v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean,
+               v->deviation);
     if (v->bin_count) text_print(out, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
     for (int bin = 0; bin < v->bin_count; bin++) text_print(out, ",%.9g", v->bin_fractions[bin]);
     text_add(out, "\n", 1);
@@ -82,7 +83,7 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
                          "it to begin anew)",
                          path, lines->header);
     lines->kept_text = old->text + header + 1;
-    lines->kept_bytes = text_keep_lines_below(lines->kept_text, lines->cycle);
+    lines->kept_bytes = text_keep_lines_below(lines->kept_text, lines->kept_below);
     return INSITU_OK;
 }
 
@@ -105,11 +106,12 @@ static void write_appended_line(text_output *out, const void *what)
     write_line(out, what);
 }
 
-insitu_status session_write_statistics(const char *path, bool is_first, int64_t cycle, double time,
-                                       const session_statistics *values, base_error *error)
+insitu_status session_write_statistics(const char *path, bool is_first, int64_t kept_below,
+                                       const session_event_time *now, const session_statistics *values,
+                                       base_error *error)
 {
     file_failure failure = {.is_missing = is_first};
-    new_lines lines = {.cycle = cycle, .time = time, .values = values};
+    new_lines lines = {.kept_below = kept_below, .now = *now, .values = values};
     if (!is_first && text_file_append(path, write_appended_line, &lines, &failure)) return INSITU_OK;
     if (!failure.is_missing) return fail_at_file(path, "written", &failure, error);
     char *header = make_header(values->bin_count, values->is_of_shells);

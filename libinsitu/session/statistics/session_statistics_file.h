@@ -6,12 +6,17 @@
 #include "error.h"
 #include "session_statistics.h"
 
-/* Adds a line to the file. Missing directories are created. is_first: this is the first line in this file
- * since the session began or went back in time; the file's lines of this cycle and of later cycles are then removed,
- * since a restarted run writes them again. If the
- * file was removed during the session, it is created again. If the file has other columns, an error is returned and the
- * file is not changed. Local. */
-insitu_status session_write_statistics(const char *path, bool is_first, int64_t cycle, double time,
-                                       const session_statistics *values, base_error *error);
+typedef struct session_event_time {
+    int64_t cycle;
+    double time;
+} session_event_time;
+
+/* Adds a line to the file. Missing directories are created. is_first: this is the first line in this file since the
+ * session began or the run went back in time; the file's lines of the cycle kept_below and of later cycles are then
+ * removed, because the run computes them again. If the file was removed during the session, it is created again. If the
+ * file has other columns, an error is returned and the file is not changed. Local. */
+insitu_status session_write_statistics(const char *path, bool is_first, int64_t kept_below,
+                                       const session_event_time *now, const session_statistics *values,
+                                       base_error *error);
 
 #endif
