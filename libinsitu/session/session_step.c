@@ -252,8 +252,8 @@ static void update_statistics_and_conditions(insitu_session *s, session_plan_bas
         base_error own = {.status = INSITU_OK};
         event_phase phase = {.basis = basis, .images = images, .error = error};
         if (!run_phase_without_invalid_fields(s, read_statistics_and_condition_fields, &phase, error, &own))
-            session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now,
-                                               &phase.valid, &s->report, &own);
+            session_process_statistics_of_step(&s->events, basis->scene, &s->meshes, basis->catalogue, basis->extent,
+                                               &s->team, &now, &phase.valid, &s->report, &own);
         if (!error->status) *error = own;
     }
     basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);

@@ -93,7 +93,7 @@ static void write_due_statistics(session_events *events, const scene *scene, con
     }
 }
 
-/* Returns whether a mesh that has the field has cells to draw on any rank. */
+/* Returns whether a mesh that has the field has cells on any rank, whether or not they are drawn. */
 static bool has_cells(const session_catalogue *catalogue, const scene_field *field)
 {
     bool is_any = false;
@@ -105,15 +105,17 @@ static bool has_cells(const session_catalogue *catalogue, const scene_field *fie
     return is_any;
 }
 
-static void warn_of_uncounted_cells(const scene *scene, const session_catalogue *catalogue, const event_work *w,
-                                    session_report *report)
+/* Warns of fields of which no cell counts. There is no warning if no cell of any mesh is drawn: the fields are not the
+ * cause then, and pictures have a warning of their own. */
+static void warn_of_uncounted_cells(const scene *scene, const session_catalogue *catalogue,
+                                    const session_extent *extent, const event_work *w, session_report *report)
 {
     for (int i = 0; i < w->count; i++) {
         const scene_field *field = w->requests[i].field;
         const bool is_condition = w->request_origins[i] >= scene->statistics_count;
         session_warn(report, &(session_warning){WARNING_UNCOUNTED, field->name, NULL, w->request_origins[i]},
-                     w->results[i].cell_count == 0 && has_cells(catalogue, field),
-                     "%s of \"%s\": no cell counts, because none has finite values: %s",
+                     w->results[i].cell_count == 0 && extent->cell_count > 0 && has_cells(catalogue, field),
+                     "%s of \"%s\": no cell counts (ghosts, no volume, or no finite value): %s",
                      is_condition ? "`when`" : "statistics", field->name,
                      is_condition ? "no picture is drawn" : "no line is written");
     }
@@ -146,9 +148,10 @@ insitu_status session_read_event_fields(const scene *scene, session_meshes *mesh
 }
 
 insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
-                                                 const session_catalogue *catalogue, const session_team *team,
-                                                 const session_event_time *now, const session_valid_events *valid,
-                                                 session_report *report, base_error *error)
+                                                 const session_catalogue *catalogue, const session_extent *extent,
+                                                 const session_team *team, const session_event_time *now,
+                                                 const session_valid_events *valid, session_report *report,
+                                                 base_error *error)
 {
     event_work work;
     if (!work_create(scene, now->cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
@@ -157,7 +160,7 @@ insitu_status session_process_statistics_of_step(session_events *events, const s
         status = session_find_statistics(meshes, catalogue, team, work.requests, work.count, work.results, error);
     if (!status) {
         store_conditions(events, scene, &work);
-        warn_of_uncounted_cells(scene, catalogue, &work, report);
+        warn_of_uncounted_cells(scene, catalogue, extent, &work, report);
         if (team->rank == 0) write_due_statistics(events, scene, &work, now, error);
         status = session_agree_without_rank(team->comm, error);
     }

@@ -5,6 +5,7 @@
 
 #include "session_catalogue.h"
 #include "session_report.h"
+#include "session_space.h"
 #include "session_statistics.h"
 #include "session_statistics_file.h"
 
@@ -48,12 +49,13 @@ insitu_status session_read_event_fields(const scene *scene, session_meshes *mesh
 
 /* Computes the statistics that are due and writes them to their files. Also computes the statistics on which images'
  * conditions depend, and stores which conditions hold. Only the events in `valid`, whose fields have been read, are
- * processed. Warns of those that count no cell. If an event fails, the other events are still processed, and the error
- * is returned afterwards. Collective. */
+ * processed. Warns of those that count no cell, unless no cell is drawn at all. If an event fails, the other events are
+ * still processed, and the error is returned afterwards. Collective. */
 insitu_status session_process_statistics_of_step(session_events *events, const scene *scene, session_meshes *meshes,
-                                                 const session_catalogue *catalogue, const session_team *team,
-                                                 const session_event_time *now, const session_valid_events *valid,
-                                                 session_report *report, base_error *error);
+                                                 const session_catalogue *catalogue, const session_extent *extent,
+                                                 const session_team *team, const session_event_time *now,
+                                                 const session_valid_events *valid, session_report *report,
+                                                 base_error *error);
 
 /* Returns the images that may be drawn in this step, one bit for each. An image may be drawn if its condition holds,
  * unless the scene draws it only once and it has been drawn before. */
