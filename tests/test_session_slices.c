@@ -380,7 +380,7 @@ static void cell_values_are_drawn_and_nan_is_grey(void **state)
     part.field.values.data = values;
     caught_picture picture =
         draw_slices(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1], point: [0, 0, 0.1]}"))), &part,
-                    "4 cells have no colour in places: values of field \"f\" are not finite");
+                    "values of field \"f\" are not finite in 4 cells: where the picture shows them");
     everywhere(own_rank != 0 || has_colours_of_cells(&picture));
     free_caught(&picture);
     test_free(values);

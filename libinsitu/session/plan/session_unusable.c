@@ -6,8 +6,7 @@
 #include "session_scalars.h"
 
 /* Iterator over the fields of the plan's isosurfaces and volumes, and over the fields that colour slices and surfaces.
- * Views of an image have the same layers, so that only
- * the first view is visited. */
+ * Views of an image have the same layers, so that only the first view is visited. */
 typedef struct field_walk {
     const session_plan *plan;
     int image; /* index of the image whose fields are visited next */
@@ -81,11 +80,40 @@ static void warn_of_unusable_cells(const char *mesh, const scene_field *field, i
                  field->name);
 }
 
+/* The count includes cells that the picture does not show, such as those inside a surface, because only drawing would
+ * tell them apart. If warn_of_unusable_cells() has warned of the same values, a second warning would say nothing new.
+ */
 static void warn_of_uncoloured_cells(const char *mesh, const scene_field *field, int64_t count, session_report *report)
 {
-    session_warn(report, &(session_warning){WARNING_UNCOLOURED, field->name, mesh, field->component}, count > 0,
-                 "mesh \"%s\": %lld cells have no colour in places: values of field \"%s\" are not finite", mesh,
-                 (long long)count, field->name);
+    const session_warning unusable = {WARNING_UNUSABLE, field->name, mesh, field->component};
+    session_warn(report, &(session_warning){WARNING_UNCOLOURED, field->name, mesh, field->component},
+                 count > 0 && !session_has_reported_warning(report, &unusable),
+                 "mesh \"%s\": values of field \"%s\" are not finite in %lld cells: where the picture shows them, they "
+                 "have the colour `nan`",
+                 mesh, field->name, (long long)count);
+}
+
+/* Warns of the plan's fields that colour slices and surfaces, or of the others. counts: memory for one number for each
+ * mesh of the catalogue. Collective. */
+static insitu_status warn_of_fields(const session_plan *plan, bool is_of_colours, const session_catalogue *catalogue,
+                                    const session_meshes *meshes, const session_team *team, int64_t *counts,
+                                    session_report *report, base_error *error)
+{
+    const int mesh_count = catalogue->mesh_count;
+    insitu_status status = INSITU_OK;
+    field_walk walk = {.plan = plan};
+    for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
+        if (walk.is_of_colours != is_of_colours) continue;
+        for (int m = 0; m < mesh_count; m++)
+            counts[m] =
+                count_unusable_cells_of_parts(meshes, catalogue->meshes[m].name, field, is_of_colours, team->threads);
+        const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
+        status = session_check_mpi(error, code, "MPI_Allreduce");
+        for (int m = 0; m < mesh_count && !status; m++)
+            (is_of_colours ? warn_of_uncoloured_cells : warn_of_unusable_cells)(catalogue->meshes[m].name, field,
+                                                                                counts[m], report);
+    }
+    return status;
 }
 
 insitu_status session_warn_of_unusable_cells(const session_plan *plan, const session_catalogue *catalogue,
@@ -96,17 +124,9 @@ insitu_status session_warn_of_unusable_cells(const session_plan *plan, const ses
     int64_t *counts = base_alloc((size_t)(mesh_count + 1) * sizeof *counts);
     if (!counts) session_fail_for_memory(error, (mesh_count + 1) * (int64_t)sizeof *counts, "counts of cells");
     insitu_status status = session_agree(team->comm, error);
-    field_walk walk = {.plan = plan};
-    for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
-        for (int m = 0; m < mesh_count; m++)
-            counts[m] = count_unusable_cells_of_parts(meshes, catalogue->meshes[m].name, field, walk.is_of_colours,
-                                                      team->threads);
-        const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
-        status = session_check_mpi(error, code, "MPI_Allreduce");
-        for (int m = 0; m < mesh_count && !status; m++)
-            (walk.is_of_colours ? warn_of_uncoloured_cells : warn_of_unusable_cells)(catalogue->meshes[m].name, field,
-                                                                                     counts[m], report);
-    }
+    /* colours come second, because their warning depends on that of the others */
+    if (!status) status = warn_of_fields(plan, false, catalogue, meshes, team, counts, report, error);
+    if (!status) status = warn_of_fields(plan, true, catalogue, meshes, team, counts, report, error);
     base_free(counts);
     if (!status) report->unusable_key = session_hash_unusable_fields(plan, meshes, team->threads);
     return status;

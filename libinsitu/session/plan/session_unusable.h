@@ -12,7 +12,8 @@
  * slices and surfaces. The warnings are the same as before if the hash has not changed on any rank. Parallel. Local. */
 uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes, int threads);
 
-/* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */
+/* Counts the cells with values that are not finite over all ranks, and warns of them. Of a field and mesh whose
+ * cells are not drawn in an isosurface or volume, there is no second warning for colours. Collective. */
 insitu_status session_warn_of_unusable_cells(const session_plan *plan, const session_catalogue *catalogue,
                                              const session_meshes *meshes, const session_team *team,
                                              session_report *report, base_error *error);
