@@ -222,13 +222,15 @@ static insitu_status update_requested_copy(session_mesh *mesh, int index, int th
     return check_index(mesh, field, &v, error);
 }
 
-/* Only an error of the field's values is stored with the field. Otherwise, as if memory has run out, the field remains
- * valid, and images may still use it. */
-static void copy_requested_values(session_mesh *mesh, int index, int threads, base_error *error)
+typedef insitu_status update_function(session_mesh *mesh, int index, int threads, base_error *error);
+
+/* Updates the copy of a field by the function `update`. Only an error of the field's values is stored with the field.
+ * Otherwise, as if memory has run out, the field remains valid, and images may still use it. */
+static void copy_field_values(session_mesh *mesh, int index, int threads, update_function *update, base_error *error)
 {
     base_error own = {.status = INSITU_OK};
     if (mesh->fields[index].problem.status) return;
-    if (update_requested_copy(mesh, index, threads, &own) == INSITU_ERROR_FIELD)
+    if (update(mesh, index, threads, &own) == INSITU_ERROR_FIELD)
         session_store_problem(&mesh->fields[index], &own, error);
     else if (!error->status)
         *error = own;
@@ -240,18 +242,11 @@ insitu_status session_copy_requested_fields(const session_meshes *meshes, int th
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
             if (mesh->fields[f].is_in_statistics || mesh->fields[f].is_source)
-                copy_requested_values(mesh, f, threads, error);
+                copy_field_values(mesh, f, threads, update_requested_copy, error);
             mesh->fields[f].is_in_statistics = false;
         }
     }
     return error->status;
-}
-
-static void copy_used_values(session_mesh *mesh, int index, int threads, base_error *error)
-{
-    base_error own = {.status = INSITU_OK};
-    if (mesh->fields[index].problem.status) return;
-    if (update_copy(mesh, index, threads, &own)) session_store_problem(&mesh->fields[index], &own, error);
 }
 
 insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error)
@@ -260,10 +255,11 @@ insitu_status session_copy_used_fields(const session_meshes *meshes, int threads
         session_mesh *mesh = meshes->items[m];
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *scalar = &mesh->scalars[i];
-            if (scalar->is_used && !session_is_distance(scalar)) copy_used_values(mesh, scalar->field, threads, error);
+            if (scalar->is_used && !session_is_distance(scalar))
+                copy_field_values(mesh, scalar->field, threads, update_copy, error);
         }
         for (int f = 0; f < mesh->field_count; f++)
-            if (mesh->fields[f].is_source) copy_used_values(mesh, f, threads, error);
+            if (mesh->fields[f].is_source) copy_field_values(mesh, f, threads, update_copy, error);
     }
     return error->status;
 }
