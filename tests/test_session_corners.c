@@ -10,6 +10,7 @@
 
 #include "test_meshes.h"
 #include "test_session_fixture.h"
+#include "session.h"
 
 enum { SIDE = 3, PIXELS = 64 * 48, PICTURES = 4, STEPS = 3, ROW = 11 };
 
@@ -456,6 +457,15 @@ static void other_fields_are_drawn_if_corners_have_no_order(void **state)
         check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_ERROR_FIELD,
                                   "is a polyhedron, whose corners", "cell ");
         everywhere(insitu_last_report(session)->images == 2);
+    }
+    /* later steps with the same mesh refuse it again, but must not compute its data again */
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    const int64_t stamp = mesh->cells_stamp;
+    for (int cycle = 3; cycle < 5; cycle++) {
+        check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_ERROR_FIELD,
+                                  "is a polyhedron, whose corners", "cell ");
+        everywhere(insitu_last_report(session)->images == 2 && mesh->cells_stamp == stamp &&
+                   !mesh->discontinuous.is_active);
     }
     discard_pictures();
     insitu_destroy(&session);

@@ -12,32 +12,45 @@
 
 /* ---- meshes with fields at corners --------------------------------------------------------------------------- */
 
-static bool is_field_at_corners(const session_mesh *mesh, const scene_field *field)
+static const session_catalogue_mesh *find_mesh_of_all_ranks(const session_catalogue *catalogue, const char *name)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        if (strcmp(catalogue->meshes[m].name, name) == 0) return &catalogue->meshes[m];
+    return NULL;
+}
+
+/* Returns whether the mesh has the field with values at corners, and no rank has found an error in the field. */
+static bool is_field_at_corners(const session_mesh *mesh, const session_catalogue *catalogue, const scene_field *field)
 {
     if (!scene_field_selects_mesh(field, mesh->name)) return false;
     const int index = session_find_field(mesh, field->name);
-    return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER && !mesh->fields[index].problem.status;
+    if (index < 0 || mesh->fields[index].given.centring != INSITU_CORNER) return false;
+    const session_catalogue_mesh *whole = find_mesh_of_all_ranks(catalogue, mesh->name);
+    const session_catalogue_field *known = whole ? session_catalogue_find_field(whole, field->name) : NULL;
+    return known && !known->fault && !mesh->fields[index].problem.status;
 }
 
-static bool is_corner_field_used_by_image(const session_mesh *mesh, const scene_image *image)
+static bool is_corner_field_used_by_image(const session_mesh *mesh, const session_catalogue *catalogue,
+                                          const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
-    bool is_in = image->condition.is_given && is_field_at_corners(mesh, &image->condition.field);
+    bool is_in = image->condition.is_given && is_field_at_corners(mesh, catalogue, &image->condition.field);
     for (const scene_field *field; !is_in && (field = scene_find_next_field_of_layers(&walk)) != NULL;)
-        is_in = is_field_at_corners(mesh, field);
+        is_in = is_field_at_corners(mesh, catalogue, field);
     return is_in;
 }
 
-static bool is_corner_field_used_by_scene(const session_mesh *mesh, const scene *scene)
+static bool is_corner_field_used_by_scene(const session_mesh *mesh, const session_catalogue *catalogue,
+                                          const scene *scene)
 {
     bool is_in = false;
     for (int i = 0; i < scene->statistics_count; i++)
-        is_in = is_in || is_field_at_corners(mesh, &scene->statistics[i].field);
+        is_in = is_in || is_field_at_corners(mesh, catalogue, &scene->statistics[i].field);
     for (int i = 0; i < scene->derived_count; i++)
         for (int k = 0; k < scene->derived[i].input_count; k++)
-            is_in = is_in || is_field_at_corners(mesh, &scene->derived[i].inputs[k]);
+            is_in = is_in || is_field_at_corners(mesh, catalogue, &scene->derived[i].inputs[k]);
     for (int i = 0; i < scene->image_count && !is_in; i++)
-        is_in = is_corner_field_used_by_image(mesh, &scene->images[i]);
+        is_in = is_corner_field_used_by_image(mesh, catalogue, &scene->images[i]);
     return is_in;
 }
 
@@ -119,9 +132,7 @@ static insitu_status make_discontinuous_connectivity(const session_mesh *mesh, i
 static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_error *error)
 {
     session_discontinuous vertices = {.is_active = true, .corner_count = session_count_corners(&mesh->given)};
-    insitu_status status = refuse_polyhedra(mesh, error);
-    if (status) return status;
-    status = make_discontinuous_connectivity(mesh, threads, &vertices, error);
+    insitu_status status = make_discontinuous_connectivity(mesh, threads, &vertices, error);
     if (status) return status;
     vertices.is_made = copy_coordinates(mesh, threads, &vertices);
     if (!vertices.is_made) {
@@ -173,20 +184,40 @@ static bool has_any_corner_field(const session_catalogue *catalogue)
     return false;
 }
 
-insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
-                                         const session_team *team, base_error *error)
+/* If cells of higher order are evaluated at additional nodes (finer.parts), cells do not share nodes, and the mesh need
+ * not be made discontinuous. */
+static bool is_made_discontinuous(const session_mesh *mesh, const session_catalogue *catalogue, const scene *scene)
+{
+    return !mesh->finer.parts && is_corner_field_used_by_scene(mesh, catalogue, scene);
+}
+
+static void refuse_meshes_without_order(const session_meshes *meshes, const session_catalogue *catalogue,
+                                        const scene *scene, base_error *error)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         base_error own = {.status = INSITU_OK};
-        /* if cells of higher order are evaluated at additional nodes (finer.parts), cells do not share nodes, and the
-         * mesh need not be made discontinuous */
-        const bool is_discontinuous = !mesh->finer.parts && is_corner_field_used_by_scene(mesh, scene);
-        if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, &own);
-        if (own.status == INSITU_ERROR_FIELD)
+        if (mesh->is_given && !mesh->discontinuous.is_made && is_made_discontinuous(mesh, catalogue, scene) &&
+            refuse_polyhedra(mesh, &own))
             store_problem_with_corner_fields(mesh, &own, error);
-        else if (!error->status)
-            *error = own;
     }
-    return has_any_corner_field(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
+}
+
+insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+                                         const session_team *team, base_error *error)
+{
+    const bool has_any = has_any_corner_field(catalogue);
+    /* Ranks agree before any of them changes a mesh. Otherwise a mesh that is refused in every step would be made
+     * discontinuous and changed back in every step, and all data of its vertices would be computed again. */
+    refuse_meshes_without_order(meshes, catalogue, scene, error);
+    const insitu_status status = has_any ? session_agree(team->comm, error) : INSITU_OK;
+    if (status) return status;
+    for (int m = 0; m < meshes->count; m++) {
+        session_mesh *mesh = meshes->items[m];
+        base_error own = {.status = INSITU_OK};
+        if (mesh->is_given)
+            update_discontinuous_mesh(meshes, mesh, is_made_discontinuous(mesh, catalogue, scene), team->threads, &own);
+        if (!error->status) *error = own;
+    }
+    return has_any ? session_agree(team->comm, error) : INSITU_OK;
 }

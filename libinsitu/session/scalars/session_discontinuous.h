@@ -17,8 +17,8 @@
 /* Makes meshes discontinuous if the scene uses a corner field of the mesh. A mesh that is already discontinuous with
  * the current coordinates is not changed. All other meshes are read with the caller's own vertices. Cells must have
  * been checked. If a mesh cannot be made discontinuous because its corners have no order, the error is also stored in
- * session_field.problem of its fields at corners, and another call then treats the mesh as if it did not have these
- * fields. Collective. */
+ * session_field.problem of its fields at corners, and no mesh is changed. After the catalogue has been updated, another
+ * call treats the mesh on all ranks as if it did not have these fields. Collective. */
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error);
 
