@@ -559,8 +559,9 @@ static bool is_preferred(const session_coarse_face *a, const session_coarse_face
     return a->is_shell != b->is_shell ? b->is_shell : session_is_larger_face(a, b);
 }
 
-/* Chooses, of the faces on which the candidate lies, the largest one on which it hangs according to session_hanging.h.
- * Sets c->face and c->weights if there is one. */
+/* Chooses, of the faces on which the candidate lies and hangs according to session_hanging.h, the preferred one
+ * (is_preferred()): the largest face of a cell with a volume or, if there is none, the largest shell. Sets c->face and
+ * c->weights if there is one. */
 static void choose_face_of_hanging_vertex(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {

@@ -10,9 +10,10 @@
  * faces with the opposite orientation have this vertex as a corner, and all of these faces are smaller. Then the vertex
  * lies between a large cell and small ones. The orientation is tested because of walls along which two meshes overlap:
  * there, a large cell and small ones lie on the same side of the vertex. If the vertex can hang on several faces, the
- * largest one is used. A corner of a face may itself be a hanging vertex on a still larger face. The face, and the
- * vertex's position on it, are determined from coordinates alone, with the same result on all ranks, regardless of
- * which mesh of a mesh group has the face.
+ * largest one is used; but a face of a cell with a volume is used rather than any shell, even a larger one. A corner of
+ * a face may itself be a hanging vertex on a still larger face. The face, and the vertex's position on it, are
+ * determined from coordinates alone, with the same result on all ranks, regardless of which mesh of a mesh group has
+ * the face.
  *
  * Triangles and quads that are cells (shells) have no other side. There, a vertex hangs on an edge of a shell if edges
  * of other shells along the same line end at this vertex, and all of them are shorter. */
