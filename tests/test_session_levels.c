@@ -678,8 +678,7 @@ static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
     }
 }
 
-/* ---- gradients across levels ---------------------------------------------------------------------------------------
- */
+/* ---- gradients across levels ------------------------------------------------------------------------------------ */
 
 /* A coarse block of 4^3 cells on the first rank and, in its middle, a fine block on the last rank. */
 typedef struct two_levels {

@@ -247,8 +247,7 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
     const session_warning warning = {WARNING_OVERLAP, image->name, NULL, 0};
     session_warn(report, &warning, pixels > 0,
                  "image \"%s\": %lld pixels where cells overlap, so that each adds its own volume (are ghost cells "
-                 "flagged?), or "
-                 "where a surface of another mesh lies within cells",
+                 "flagged?), or where a surface of another mesh lies within cells",
                  image->name, (long long)pixels);
 }
 
