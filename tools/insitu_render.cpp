@@ -108,7 +108,8 @@ class render_session
     insitu_vtk_report set(vtkDataObject *data, const std::vector<leaf_mesh> &leaves)
     {
         for (const leaf_mesh &leaf : leaves)
-            (void)insitu_vtk_draw_by_corners(adaptor_, leaf.name.c_str(), leaf.has_faces);
+            if (insitu_vtk_draw_by_corners(adaptor_, leaf.name.c_str(), leaf.has_faces) != INSITU_OK)
+                throw std::runtime_error(insitu_vtk_error(adaptor_));
         insitu_vtk_report report;
         const insitu_status status = insitu_vtk_set(adaptor_, mesh_name, data, &report);
         const bool has_no_cells = status == INSITU_ERROR_MESH && report.cells == 0 && report.cells_not_drawn > 0;

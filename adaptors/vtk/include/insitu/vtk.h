@@ -106,7 +106,8 @@ INSITU_API insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char 
  * a leaf of a composite, such as "domain/3". A grid whose cells are distributed over ranks is drawn the same on any
  * number of ranks only if all ranks choose this as soon as one rank's part has polygons or polyhedra. Local.
  *
- * Returns INSITU_ERROR_ARGUMENT if adaptor or mesh is NULL. */
+ * Returns INSITU_ERROR_ARGUMENT if adaptor or mesh is NULL, and INSITU_ERROR_MEMORY if memory runs out; the choice is
+ * then unchanged. */
 INSITU_API insitu_status insitu_vtk_draw_by_corners(insitu_vtk_adaptor *adaptor, const char *mesh, bool is_by_corners);
 
 /* Returns the message of the last call that failed on this adaptor, or "" if none did. Valid until the next call.
