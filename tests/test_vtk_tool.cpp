@@ -358,6 +358,28 @@ void default_pictures_of_files_with_unusual_names_are_drawn(void **)
     assert_true(fs::exists(here / "{cycle}_0000.png"));
 }
 
+/* Checks that the default picture is that of the first field whose name is UTF-8. The other names are Latin-1, and
+ * characters that a scene can only contain as escapes: a control character, a noncharacter and a line separator. */
+void fields_with_unusual_names_are_drawn_if_the_names_are_utf8(void **)
+{
+    const std::string head = "# vtk DataFile Version 3.0\nfields\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+                             "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\nPOINT_DATA 3\n",
+                      latin = "h\xf6he";
+    const auto make_field = [](const std::string &name) {
+        return "SCALARS " + name + " float\nLOOKUP_TABLE default\n0 1 2\n";
+    };
+    for (const std::string &name : {std::string("h\u00f6he"), std::string("\xc2\x85"), std::string("a\uffffb"),
+                                    std::string("a\u2028b"), std::string("\U0001f600")}) {
+        write_file(make_path("named.vtk"), head + make_field(latin) + make_field(name));
+        expect_result(run_tool("--size 32x24 named.vtk"), 0, "1 picture");
+        expect_result(run_tool("--size 32x24 --field " + quote_for_shell(name) + " named.vtk"), 0, "1 picture");
+    }
+    write_file(make_path("named.vtk"), head + make_field(latin));
+    expect_result(run_tool("--size 32x24 named.vtk"), 0, "1 picture");
+    expect_result(run_tool("--size 32x24 --field " + quote_for_shell(latin) + " named.vtk"), 1,
+                  "--field " + latin + ": is not UTF-8");
+}
+
 void empty_input_is_an_error(void **)
 {
     expect_result(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
@@ -647,6 +669,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(read_failure_on_one_rank_stops_all_ranks),
         cmocka_unit_test(default_pictures_of_two_files_have_two_names),
         cmocka_unit_test(default_pictures_of_files_with_unusual_names_are_drawn),
+        cmocka_unit_test(fields_with_unusual_names_are_drawn_if_the_names_are_utf8),
         cmocka_unit_test(empty_input_is_an_error),
         cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),

@@ -29,6 +29,7 @@
 #include "data_file.h"
 #include "drawn_cells.h"
 #include "grids_of.h"
+#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -65,12 +66,13 @@ grid_list list_grids(vtkDataObject *data)
     return grids;
 }
 
-/* Checks whether an array is a field to display. Arrays of ids and VTK's own flags are not displayed. */
+/* Checks whether an array is a field to display. Arrays of ids and VTK's own flags are not displayed, nor are arrays
+ * whose names are not UTF-8, because a scene is UTF-8 and cannot name them. */
 bool is_field(vtkDataArray *array)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
-    return !name.empty() && name.rfind("vtk", 0) != 0 && name != "GlobalNodeId" && name != "GlobalElementId" &&
-           name != "ObjectId" && name != "PedigreeNodeId" && name != "PedigreeElementId";
+    return !name.empty() && is_utf8(name) && name.rfind("vtk", 0) != 0 && name != "GlobalNodeId" &&
+           name != "GlobalElementId" && name != "ObjectId" && name != "PedigreeNodeId" && name != "PedigreeElementId";
 }
 
 void add_names(vtkFieldData *fields, std::vector<std::string> &names)

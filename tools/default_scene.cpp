@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "file_kinds.h"
+#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -16,39 +17,25 @@ namespace render_tool
 namespace
 {
 
-/* Returns the number of bytes of the character of UTF-8 that begins at this index. Returns 0 if the bytes there are no
- * character, or a control character. */
-size_t get_character_length(const std::string &text, size_t at)
-{
-    const auto byte = [&](size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-    const unsigned first = byte(at), second = byte(at + 1);
-    if (first < 0x80) return first < 0x20 || first == 0x7f ? 0 : 1;
-    const size_t length = first < 0xc2 ? 0 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : first < 0xf5 ? 4 : 0;
-    for (size_t i = 1; i < length; i++)
-        if ((byte(at + i) & 0xc0) != 0x80) return 0;
-    const bool is_control = first == 0xc2 && second < 0xa0, is_surrogate = first == 0xed && second >= 0xa0,
-               is_too_long = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90),
-               is_too_large = first == 0xf4 && second >= 0x90;
-    return is_control || is_surrogate || is_too_long || is_too_large ? 0 : length;
-}
-
-/* Returns the text as a double-quoted scalar of YAML. Names of files need not be UTF-8: other bytes are taken for
- * characters of Latin-1. */
+/* Returns the text as a double-quoted scalar of YAML. Characters that YAML does not allow or would change, such as
+ * control characters and line separators, are escaped, as are all others beyond ASCII. Names of files need not be
+ * UTF-8: other bytes are taken for characters of Latin-1. */
 std::string quoted(const std::string &text)
 {
     std::string out = "\"";
     for (size_t at = 0; at < text.size();) {
-        const size_t length = get_character_length(text, at);
-        if (length == 0) {
-            char code[8];
-            std::snprintf(code, sizeof code, "\\x%02x", static_cast<unsigned>(static_cast<unsigned char>(text[at])));
-            out += code;
-            at++;
-            continue;
+        uint32_t code = 0;
+        const size_t length = decode_character(text, at, code);
+        if (length == 0) code = static_cast<unsigned char>(text[at]);
+        if (code >= 0x20 && code < 0x7f) {
+            if (code == '"' || code == '\\') out += '\\';
+            out += text[at];
+        } else {
+            char escape[16];
+            std::snprintf(escape, sizeof escape, "\\U%08x", static_cast<unsigned>(code));
+            out += escape;
         }
-        if (text[at] == '"' || text[at] == '\\') out += '\\';
-        out.append(text, at, length);
-        at += length;
+        at += std::max<size_t>(length, 1);
     }
     return out + '"';
 }
@@ -62,7 +49,7 @@ std::string get_beginning(const std::string &text, size_t size)
 }
 
 /* Returns the title of a file's pictures. A title cannot contain braces, because they enclose placeholders, so they are
- * replaced by brackets. */
+ * replaced by parentheses. */
 std::string make_title(const std::filesystem::path &file)
 {
     std::string title = get_beginning(file.stem().string(), 60);

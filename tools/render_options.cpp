@@ -17,6 +17,7 @@
 
 #include "data_file.h"
 #include "part_files.h"
+#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -64,6 +65,13 @@ void parse_camera(const std::string &text, options &o)
     char direction[100];
     std::snprintf(direction, sizeof direction, "%.9g, %.9g, %.9g", d[0] / size, d[1] / size, d[2] / size);
     o.direction = direction;
+}
+
+void parse_field(const std::string &text, options &o)
+{
+    if (!is_utf8(text))
+        throw std::runtime_error("--field " + text + ": is not UTF-8, and a scene cannot name such a field");
+    o.field = text;
 }
 
 /* A path, by whose numbers files are sorted. Only paths with the same gaps and as many numbers are compared. */
@@ -242,9 +250,7 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     add_value(app, o, "--partition", "HOW", parse_partition_name,
               "how cells are dealt out to ranks: block (default), random or\n"
               "checkerboard; pictures do not depend on it");
-    add_value(
-        app, o, "--field", "NAME", [](const std::string &text, options &to) { to.field = text; },
-        "without a scene: the field; the first is the default");
+    add_value(app, o, "--field", "NAME", parse_field, "without a scene: the field; the first is the default");
     add_value(app, o, "--size", "WxH", parse_size, "without a scene: the picture's size; 1280x720 is the default");
     add_value(app, o, "--camera", "X,Y,Z", parse_camera, "without a scene: the direction from the data to the eye");
     app.add_flag("--whole", o.whole, "without a scene: solids whose outside shows little are not cut open");
