@@ -559,6 +559,30 @@ vtkSmartPointer<vtkUnstructuredGrid> make_bent_hexes(int count, int last)
     return grid;
 }
 
+void write_blocks(const std::string &name, const std::vector<vtkSmartPointer<vtkUnstructuredGrid>> &grids)
+{
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    for (size_t b = 0; b < grids.size(); b++) blocks->SetBlock(static_cast<unsigned>(b), grids[b]);
+    vtkNew<vtkXMLMultiBlockDataWriter> writer;
+    writer->SetFileName(make_path(name).c_str());
+    writer->SetInputData(blocks);
+    assert_int_equal(writer->Write(), 1);
+}
+
+/* Draws on 1, 2 and 3 ranks; expects the same picture, without a warning that cells are drawn by their corners. */
+void expect_bent_hexes_on_any_ranks(const std::string &arguments)
+{
+    std::string first;
+    for (const int ranks : {1, 2, 3}) {
+        const run_result r = run_ranks(ranks, arguments);
+        expect_result(r, 0, "1 step, 1 picture");
+        if (r.contains_text("drawn by their corners")) fail_msg("%s on %d ranks: by corners", arguments.c_str(), ranks);
+        const std::string picture = read_file(make_path("a_00.exr"));
+        if (first.empty()) first = picture;
+        if (picture != first || picture.empty()) fail_msg("%s on %d ranks: differs", arguments.c_str(), ranks);
+    }
+}
+
 /* Checks that hexes of order 2 are drawn by their corners on all ranks if only one rank has the polyhedron or polygon
  * that is in one grid with them, and that they are not if that cell is in another block. */
 void higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks(void **)
@@ -574,18 +598,25 @@ void higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks(void **
             assert_true(picture == first && !picture.empty());
         }
     }
-    vtkNew<vtkMultiBlockDataSet> blocks;
-    blocks->SetBlock(0, make_bent_hexes(5, VTK_QUADRATIC_HEXAHEDRON));
-    blocks->SetBlock(1, make_bent_hexes(0, VTK_POLYHEDRON));
-    vtkNew<vtkXMLMultiBlockDataWriter> writer;
-    writer->SetFileName(make_path("beside.vtm").c_str());
-    writer->SetInputData(blocks);
-    assert_int_equal(writer->Write(), 1);
-    for (const int ranks : {1, 2, 3}) {
-        const run_result r = run_ranks(ranks, "scene.yaml beside.vtm");
-        expect_result(r, 0, "1 step, 1 picture");
-        assert_false(r.contains_text("drawn by their corners"));
-    }
+    write_blocks("beside.vtm", {make_bent_hexes(5, VTK_QUADRATIC_HEXAHEDRON), make_bent_hexes(0, VTK_POLYHEDRON)});
+    expect_bent_hexes_on_any_ranks("scene.yaml beside.vtm");
+}
+
+/* Checks that leaves have the same numbers on all ranks if ranks read different files, each of which has several
+ * leaves. On two ranks, the hexes of order 2 of the second file would otherwise have the number of the first file's
+ * polyhedron, and be drawn by their corners, and the last leaf would have no number that a rank knows. */
+void leaves_of_several_composite_files_are_drawn_the_same_on_any_ranks(void **)
+{
+    write_blocks("leaves_0.vtm", {make_row_of_tets(1), make_bent_hexes(0, VTK_POLYHEDRON)});
+    write_blocks("leaves_1.vtm", {make_bent_hexes(5, VTK_QUADRATIC_HEXAHEDRON), make_row_of_tets(2, 8)});
+    write_file(make_path("leaves.pvd"), "<VTKFile type=\"Collection\"><Collection><DataSet file=\"leaves_0.vtm\"/>"
+                                        "<DataSet file=\"leaves_1.vtm\"/></Collection></VTKFile>\n");
+    const std::string given = scene, layer = "field: x\n";
+    write_file(make_path("last.yaml"),
+               given.substr(0, given.find(layer)) + "mesh: data/3\n          " + given.substr(given.find(layer)));
+    for (const std::string files : {"--pieces leaves_0.vtm leaves_1.vtm", "leaves.pvd"})
+        for (const std::string scene_file : {"scene.yaml ", "last.yaml "})
+            expect_bent_hexes_on_any_ranks(scene_file + files);
 }
 
 vtkSmartPointer<vtkUnstructuredGrid> make_row_at_time(double time, int count, int first = 0)
@@ -612,13 +643,7 @@ void time_is_read_from_any_piece(void **)
                                              "<Piece Source=\"time_1.vtu\"/>" + tail);
     write_file(make_path("time.pvd"), "<VTKFile type=\"Collection\"><Collection><DataSet file=\"row_2.vtu\"/>"
                                       "<DataSet file=\"time_1.vtu\"/></Collection></VTKFile>\n");
-    vtkNew<vtkMultiBlockDataSet> blocks;
-    blocks->SetBlock(0, make_row_of_tets(3));
-    blocks->SetBlock(1, make_row_at_time(2.5, 2, 3));
-    vtkNew<vtkXMLMultiBlockDataWriter> writer;
-    writer->SetFileName(make_path("time.vtm").c_str());
-    writer->SetInputData(blocks);
-    assert_int_equal(writer->Write(), 1);
+    write_blocks("time.vtm", {make_row_of_tets(3), make_row_at_time(2.5, 2, 3)});
     for (const int ranks : {1, 2, 3})
         for (const char *files :
              {"time_0.vtu", "time_a.pvtu", "time_b.pvtu", "time.pvd", "time.vtm", "--pieces row_2.vtu time_1.vtu"})
@@ -681,6 +706,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(higher_order_cells_beside_polyhedra_are_drawn_the_same_on_any_ranks),
+        cmocka_unit_test(leaves_of_several_composite_files_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(time_is_read_from_any_piece),
         cmocka_unit_test(pieces_with_several_steps_are_refused),
         cmocka_unit_test(every_distribution_mode_reads_all_cells),

@@ -134,8 +134,18 @@ class render_session
     insitu_vtk_adaptor *adaptor_ = nullptr;
 };
 
-/* Makes all ranks agree which leaves have polygons or polyhedra, beside which cells of higher order are drawn by their
- * corners. A rank may have none of the polyhedra of a leaf, or no part of the data at all. Collective. */
+/* Makes all ranks agree on the numbers of leaves in the blocks of a multiblock; blocks that a rank has not read have
+ * the number -1 there. Collective. */
+void agree_on_leaf_counts(const rank_info &w, std::vector<int> &leaf_counts)
+{
+    int count = static_cast<int>(leaf_counts.size());
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT, MPI_MAX, w.comm);
+    leaf_counts.resize(static_cast<size_t>(count), -1);
+    MPI_Allreduce(MPI_IN_PLACE, leaf_counts.data(), count, MPI_INT, MPI_MAX, w.comm);
+}
+
+/* Makes all ranks agree on which leaves have polygons or polyhedra, beside which cells of higher order are drawn by
+ * their corners. A rank may have none of the polyhedra of a leaf, or no part of the data at all. Collective. */
 void agree_on_faces(const rank_info &w, std::vector<leaf_mesh> &leaves)
 {
     int count = static_cast<int>(leaves.size());
@@ -266,11 +276,17 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
     const std::string name = source.name(index);
     bar.begin(index, name);
     step_source::result part;
+    std::vector<int> leaf_counts;
     std::vector<leaf_mesh> leaves;
     insitu_vtk_report report{};
     const auto start = std::chrono::steady_clock::now();
     run_on_all_ranks(w, [&] {
         part = source.read(index);
+        leaf_counts = count_leaves_of_blocks(part.data);
+    });
+    agree_on_leaf_counts(w, leaf_counts);
+    run_on_all_ranks(w, [&] {
+        add_empty_leaves(part.data, leaf_counts);
         leaves = list_leaf_meshes(part.data, mesh_name);
     });
     agree_on_faces(w, leaves);

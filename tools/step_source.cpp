@@ -42,6 +42,19 @@ std::optional<double> find_time(const data_file &file, size_t step, vtkDataObjec
     return find_time_of_data(data);
 }
 
+/* Converts data as convert_to_drawable_data() does, but the leaves of each block of a multiblock stay in one block, so
+ * that their number can be made known to ranks that do not read the block (add_empty_leaves()). */
+vtkSmartPointer<vtkDataObject> convert_blocks(vtkDataObject *data, const std::string &path)
+{
+    auto *blocks = vtkMultiBlockDataSet::SafeDownCast(data);
+    if (!blocks) return convert_to_drawable_data(data, path);
+    auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+    all->SetNumberOfBlocks(blocks->GetNumberOfBlocks());
+    for (unsigned b = 0; b < blocks->GetNumberOfBlocks(); b++)
+        if (blocks->GetBlock(b)) all->SetBlock(b, convert_to_drawable_data(blocks->GetBlock(b), path));
+    return all;
+}
+
 } // namespace
 
 step_source::step_source(const options &o, int rank, int ranks) : options_(o), rank_(rank), ranks_(ranks)
@@ -134,8 +147,9 @@ step_source::result step_source::read(size_t index)
     r.warnings = earlier_warnings + file.take_warnings();
     r.time = find_time(file, s.inside, data);
     if (!data) return r;
-    const auto drawable = convert_to_drawable_data(data, file.step_path(s.inside));
-    r.data = is_by_pieces ? drawable : distribute_cells(drawable, options_.how, rank_, ranks_);
+    const std::string path = file.step_path(s.inside);
+    r.data = is_by_pieces ? convert_blocks(data, path)
+                          : distribute_cells(convert_to_drawable_data(data, path), options_.how, rank_, ranks_);
     return r;
 }
 

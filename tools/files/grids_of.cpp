@@ -123,6 +123,34 @@ vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, con
     return amr;
 }
 
+std::vector<int> count_leaves_of_blocks(vtkDataObject *data)
+{
+    std::vector<int> counts;
+    auto *blocks = vtkMultiBlockDataSet::SafeDownCast(data);
+    for (unsigned b = 0; blocks && b < blocks->GetNumberOfBlocks(); b++) {
+        vtkNew<vtkMultiBlockDataSet> one;
+        one->SetBlock(0, blocks->GetBlock(b));
+        const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(one->NewIterator());
+        it->SkipEmptyNodesOff();
+        int count = 0;
+        for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem()) count++;
+        counts.push_back(blocks->GetBlock(b) ? count : -1);
+    }
+    return counts;
+}
+
+void add_empty_leaves(vtkDataObject *data, const std::vector<int> &leaf_counts)
+{
+    auto *blocks = vtkMultiBlockDataSet::SafeDownCast(data);
+    for (unsigned b = 0; blocks && b < blocks->GetNumberOfBlocks(); b++) {
+        const int count = leaf_counts[b];
+        if (blocks->GetBlock(b) || count < 0 || count == 1) continue;
+        vtkNew<vtkMultiBlockDataSet> empty;
+        empty->SetNumberOfBlocks(static_cast<unsigned>(count));
+        blocks->SetBlock(b, empty);
+    }
+}
+
 std::vector<leaf_mesh> list_leaf_meshes(vtkDataObject *data, const std::string &name)
 {
     const auto has_faces = [](vtkDataObject *leaf) {

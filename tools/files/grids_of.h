@@ -29,6 +29,13 @@ vtkSmartPointer<vtkDataObject> convert_to_drawable_data(vtkDataObject *data, con
  * exist. */
 std::string find_bad_cell(vtkUnstructuredGrid *grid);
 
+/* If a rank reads only some blocks of a multiblock, the others are null, and count as one leaf. These functions give
+ * them as many empty leaves as they have on the ranks that read them, so that leaves have the same numbers on all
+ * ranks. count_leaves_of_blocks() returns the number of leaves in each block, with -1 for null; the list is empty if
+ * data is no multiblock. add_empty_leaves() takes the largest number of any rank for each block. */
+std::vector<int> count_leaves_of_blocks(vtkDataObject *data);
+void add_empty_leaves(vtkDataObject *data, const std::vector<int> &leaf_counts);
+
 /* The mesh that a leaf of a data set becomes. */
 struct leaf_mesh {
     std::string name;       // name that the VTK adaptor gives to the mesh if the leaf is not a structured block
