@@ -596,6 +596,52 @@ std::string replace_text(std::string text, const std::string &old, const std::st
     return text.replace(at, old.size(), by);
 }
 
+/* A file in which VALUE is replaced, and the line that contains it. */
+struct text_file {
+    std::string name, text, line;
+    std::vector<std::pair<std::string, std::string>> values; // words, with what the message says about them, or ""
+};
+
+/* Returns files whose field has integers, with numbers at and beyond both ends of the range of their type. */
+std::vector<text_file> list_files_of_integers(const std::string &vtu, const std::string &vtk)
+{
+    const std::string no_number = "is no number";
+    std::vector<text_file> files;
+    struct integer_type {
+        std::string in_vtu, in_vtk, smallest, largest, too_small, too_large;
+    };
+    for (const integer_type &type :
+         {integer_type{"Int8", "signed_char", "-128", "127", "-129", "128"},
+          integer_type{"UInt8", "unsigned_char", "0", "255", "-1", "300"},
+          integer_type{"Int16", "short", "-32768", "+32767", "-32769", "32768"},
+          integer_type{"UInt16", "unsigned_short", "-0", "65535", "-1", "65536"},
+          integer_type{"Int32", "int", "-2147483648", "2147483647", "-2147483649", "3000000000"},
+          integer_type{"UInt32", "unsigned_int", "0", "4294967295", "-1", "4294967296"},
+          integer_type{"Int64", "vtktypeint64", "-9223372036854775808", "9223372036854775807", "-9223372036854775809",
+                       "9223372036854775808"},
+          integer_type{"UInt64", "vtktypeuint64", "0", "18446744073709551615", "-1", "18446744073709551616"}})
+        for (const bool is_vtu : {true, false}) {
+            const std::string name = is_vtu ? type.in_vtu : type.in_vtk,
+                              wrong = "is a number that VTK does not read as " + name;
+            const std::string text = is_vtu ? replace_text(replace_text(vtu, "Float64", name), "NAN", "3")
+                                            : replace_text(vtk, "f double", "f " + name);
+            files.push_back({is_vtu ? "integer.vtu" : "integer.vtk",
+                             text,
+                             is_vtu ? "line 5: " : "line 16: ",
+                             {{type.smallest, ""},
+                              {type.largest, ""},
+                              {"007", ""},
+                              {type.too_small, wrong},
+                              {type.too_large, wrong},
+                              {"4e2", wrong},
+                              {"4.7", wrong},
+                              {"nan", wrong},
+                              {"0x1", no_number},
+                              {"-", no_number}}});
+        }
+    return files;
+}
+
 /* Checks text files in which the last value is replaced by a word that VTK does not read as a number, such as a number
  * in Fortran's notation without the letter of the exponent. */
 void numbers_that_vtk_does_not_read_are_refused_with_their_line(void **)
@@ -613,10 +659,6 @@ void numbers_that_vtk_does_not_read_are_refused_with_their_line(void **)
     const std::string vtk = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
                             "0 0 0 1 0 0\n0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\n"
                             "SCALARS f double\nLOOKUP_TABLE default\n1 2 3\nVALUE\n";
-    struct text_file {
-        std::string name, text, line;
-        std::vector<std::pair<std::string, std::string>> values; // words, with what the message says about them, or ""
-    };
     const std::vector<std::pair<std::string, std::string>> any = {{"0.123456-101", no_number}, {"0.5+120", no_number},
                                                                   {"1.5D+00", no_number},      {"1e-101", ""},
                                                                   {"********", no_number},     {"4", ""},
@@ -627,6 +669,7 @@ void numbers_that_vtk_does_not_read_are_refused_with_their_line(void **)
     files[1].values.insert(files[1].values.end(), {{"nan", not_read}, {"-inf", not_read}});
     files.push_back({"single.vtu", replace_text(vtu, "Float64", "Float32"), "line 5: ", {{"1e39", not_read}}});
     files.push_back({"single.vtk", replace_text(vtk, "f double", "f float"), "line 16: ", {{"1e39", not_read}}});
+    for (const text_file &file : list_files_of_integers(vtu, vtk)) files.push_back(file);
     for (const text_file &file : files)
         for (const auto &[value, what] : file.values) {
             write_file(folder + "/" + file.name, replace_text(file.text, "VALUE", value));
@@ -640,6 +683,18 @@ void numbers_that_vtk_does_not_read_are_refused_with_their_line(void **)
                 what.empty() ? "" : folder + "/" + file.name + ": " + file.line + "\"" + value + "\" " + what;
             if (message != expected) fail_msg("%s with %s: %s", file.name.c_str(), value.c_str(), message.c_str());
         }
+}
+
+/* Checks colours in text files of VTK's legacy format: they are numbers from 0 to 1, while binary files have bytes. */
+void colours_in_text_are_read(void **)
+{
+    write_file(
+        folder + "/colours.vtk",
+        "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0\n0 1 0\n"
+        "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\nPOINT_DATA 3\nCOLOR_SCALARS c 2\n0 0.5 1 0.25 1e-1 0\n"
+        "LOOKUP_TABLE t 1\n0.5 0.5 0.5 1\n");
+    const auto grid = read_grid("colours.vtk");
+    assert_int_equal(grid->GetPointData()->GetArray("c")->GetComponent(1, 0), 255);
 }
 
 /* Checks files in which a '>' does not end a tag, or blanks surround '=': their values are not text. */
@@ -820,6 +875,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grids_without_cells_are_accepted),
         cmocka_unit_test(texts_and_bits_of_pieces_cause_no_warning),
         cmocka_unit_test(numbers_that_vtk_does_not_read_are_refused_with_their_line),
+        cmocka_unit_test(colours_in_text_are_read),
         cmocka_unit_test(tags_end_at_their_own_bracket),
         cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),
         cmocka_unit_test(ensight_file_sets_are_read_step_by_step),

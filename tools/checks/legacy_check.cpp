@@ -6,6 +6,7 @@
 #include "number_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdint>
 #include <fstream>
@@ -102,35 +103,51 @@ class legacy_parser
         return std::stoll(text);
     }
 
-    /* Returns the size of this many values in bytes, or -1 if the type is unknown or its values differ in size. */
-    int64_t compute_size_of_values(int64_t values, const std::string &type) const
+    /* Returns the type of this name, or null if the type is unknown or its values differ in size. */
+    static const number_type *find_type(const std::string &name)
     {
-        static const std::map<std::string, int64_t> sizes = {
-            {"char", 1},           {"signed_char", 1}, {"unsigned_char", 1},      {"short", 2},
-            {"unsigned_short", 2}, {"int", 4},         {"unsigned_int", 4},       {"vtkidtype", 4},
-            {"float", 4},          {"long", 8},        {"unsigned_long", 8},      {"double", 8},
-            {"vtktypeint64", 8},   {"long_long", 8},   {"unsigned_long_long", 8}, {"vtktypeuint64", 8}};
-        if (type == "bit") return (values + 7) / 8;
-        const auto found = sizes.find(type);
-        return found == sizes.end() ? -1 : values * found->second;
+        static const std::array<number_type, 17> types = {{{"bit", 1, true, false},
+                                                           {"char", 8, true, true},
+                                                           {"signed_char", 8, true, true},
+                                                           {"unsigned_char", 8, true, false},
+                                                           {"short", 16, true, true},
+                                                           {"unsigned_short", 16, true, false},
+                                                           {"int", 32, true, true},
+                                                           {"unsigned_int", 32, true, false},
+                                                           {"vtkidtype", 32, true, true},
+                                                           {"long", 64, true, true},
+                                                           {"unsigned_long", 64, true, false},
+                                                           {"long_long", 64, true, true},
+                                                           {"unsigned_long_long", 64, true, false},
+                                                           {"vtktypeint64", 64, true, true},
+                                                           {"vtktypeuint64", 64, true, false},
+                                                           {"float", 32, false, true},
+                                                           {"double", 64, false, true}}};
+        const auto found =
+            std::find_if(types.begin(), types.end(), [&](const auto &type) { return type.name == name; });
+        return found == types.end() ? nullptr : &*found;
     }
 
     /* Skips values; returns false if their size is not known. */
-    bool skip_values(int64_t values, const std::string &type)
+    bool skip_values(int64_t values, const std::string &type_name)
     {
         if (values / 8 > size_) fail("it says it has " + std::to_string(values) + " values");
-        const int64_t bytes = compute_size_of_values(values, type);
-        if (bytes < 0) return false;
+        const number_type *type = find_type(type_name);
+        if (!type) return false;
         if (is_text_) {
-            skip_words(values, type == "float");
+            skip_words(values, *type);
             return true;
         }
+        const int64_t bytes = type->bits < 8 ? (values + 7) / 8 : values * (type->bits / 8);
         if (bytes > size_ - static_cast<int64_t>(in_.tellg())) fail("values of \"" + words_[0] + "\" are missing");
         in_.seekg(bytes, std::ios::cur);
         return true;
     }
 
-    void skip_words(int64_t count, bool is_single)
+    /* Skips colours, which are bytes in binary files, and numbers from 0 to 1 in text. */
+    bool skip_colours(int64_t values) { return skip_values(values, is_text_ ? "float" : "unsigned_char"); }
+
+    void skip_words(int64_t count, const number_type &type)
     {
         std::streambuf *bytes = in_.rdbuf();
         const int end = std::char_traits<char>::eof();
@@ -140,8 +157,9 @@ class legacy_parser
             if (c == end) fail("values of \"" + words_[0] + "\" are missing");
             std::string value;
             for (; c != end && !std::isspace(c); c = bytes->snextc()) value += static_cast<char>(c);
-            if (!is_readable_number(value, false, is_single))
-                refuse_number(path_, value, static_cast<int64_t>(in_.tellg()) - static_cast<int64_t>(value.size()));
+            if (!is_readable_number(value, false, type))
+                refuse_number(path_, value, static_cast<int64_t>(in_.tellg()) - static_cast<int64_t>(value.size()),
+                              type);
         }
     }
 
@@ -231,8 +249,8 @@ class legacy_parser
         const auto found = components.find(name);
         if (found != components.end()) return skip_values(tuples_ * found->second, word(2));
         if (name == "texture_coordinates") return skip_values(tuples_ * count(2), word(3));
-        if (name == "color_scalars") return skip_values(tuples_ * count(2), "unsigned_char");
-        if (name == "lookup_table") return skip_values(4 * count(2), "unsigned_char");
+        if (name == "color_scalars") return skip_colours(tuples_ * count(2));
+        if (name == "lookup_table") return skip_colours(4 * count(2));
         if (name == "scalars") return skip_scalars();
         if (in_.eof() || in_.peek() == std::char_traits<char>::eof()) fail("\"" + words_[0] + "\" is not whole");
         return false;
