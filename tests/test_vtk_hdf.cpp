@@ -318,6 +318,34 @@ void cells_are_found_behind_a_step_without_cells(void **)
     expect_step("late.vtkhdf", 2, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
 }
 
+/* Checks a step with cells of its own after steps that reuse the cells of the first, whose parts are not in the lists
+ * of cells and offsets, and a step without cells, which is in the list of offsets. */
+void cells_are_found_behind_steps_that_reuse_cells(void **)
+{
+    {
+        writer w("reused.vtkhdf", "UnstructuredGrid");
+        lists all;
+        add_part(all, 0, 1, 0, 0);
+        for (int i = 0; i < 4; i++) {
+            all.point_counts.push_back(8);
+            all.cell_counts.push_back(1);
+            all.id_counts.push_back(8);
+        }
+        add_part(all, 0, 0, 0, 0);
+        add_part(all, 2, 3, 1, 1);
+        add_part(all, 5, 2, 2, 2);
+        w.write_dataset(all);
+        w.write_steps({0, 1, 2, 3, 4, 5, 6, 7});
+        w.write_dataset("Steps/PartOffsets", numbers{0, 1, 2, 3, 4, 5, 6, 7});
+        w.write_dataset("Steps/PointOffsets", numbers{0, 0, 0, 0, 0, 8, 8, 32});
+        w.write_dataset("Steps/CellOffsets", numbers{0, 0, 0, 0, 0, 1, 1, 4});
+        w.write_dataset("Steps/ConnectivityIdOffsets", numbers{0, 0, 0, 0, 0, 8, 8, 32});
+    }
+    for (const size_t step : {0, 1, 4}) expect_step("reused.vtkhdf", step, "1 cells x 0..1 z 0..1 f 0..1 c 0..0; ");
+    expect_step("reused.vtkhdf", 6, "3 cells x 2..5 z 1..2 f 102..105 c 102..104; ");
+    expect_step("reused.vtkhdf", 7, "2 cells x 5..7 z 2..3 f 205..207 c 205..206; ");
+}
+
 void unsupported_types_are_refused_by_name(void **)
 {
     for (const char *type :
@@ -370,6 +398,7 @@ int main()
         cmocka_unit_test(steps_of_values_share_their_mesh),
         cmocka_unit_test(points_that_move_keep_their_cells),
         cmocka_unit_test(cells_are_found_behind_a_step_without_cells),
+        cmocka_unit_test(cells_are_found_behind_steps_that_reuse_cells),
         cmocka_unit_test(unsupported_types_are_refused_by_name),
     };
     return cmocka_run_group_tests(tests, set_up_test_group, nullptr);

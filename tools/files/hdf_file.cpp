@@ -312,7 +312,7 @@ class hdf_grids : public data_file
         at.id = read_step_entry("ConnectivityIdOffsets", step, 0);
         set_counts(at);
         at.offset = at.cell + at.part;
-        if (!offsets_fit(at)) at.offset = at.cell + count_extra_offsets(at);
+        if (!offsets_fit(at)) at.offset = find_offset(at);
         return at;
     }
 
@@ -323,19 +323,22 @@ class hdf_grids : public data_file
                in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
     }
 
-    /* Returns the difference between a part's first index in the file's list of offsets and its first index in the list
-     * of cells. Each earlier part increases the difference by 1, because it has one more offset than cells. Parts that
-     * reuse the cells of an earlier step have no entries in either list, and are not counted. Parts without cells are
-     * counted, even directly before a part with cells. */
-    int64_t count_extra_offsets(const part_position &at) const
+    /* Returns a part's first index in the file's list of offsets, which differs from its first index in the list of
+     * cells by the number of parts before it: each of them has one more offset than cells, and its first offset is 0.
+     * Parts that reuse the cells of an earlier step have no entries in either list. If no index fits, returns that of
+     * a file without such parts. */
+    int64_t find_offset(part_position at) const
     {
+        const std::string name = "/VTKHDF/Offsets";
+        const int64_t most = in_.has(name) ? in_.length(name) : 0, end = std::min(most, at.cell + at.part + 1);
+        const array_pointer offsets = end > 0 ? in_.rows(name, 0, end, VTK_ID_TYPE) : nullptr;
         int64_t parts = 0;
-        for (int64_t cells = 0; parts < at.part; parts++) {
-            const int64_t count = in_.number("/VTKHDF/NumberOfCells", parts);
-            if (cells >= at.cell && (count > 0 || at.cells == 0)) break;
-            cells += count;
+        for (at.offset = 0; offsets && at.offset < end; at.offset++) {
+            if (offsets->GetComponent(at.offset, 0) != 0) continue;
+            if (at.offset - parts == at.cell && offsets_fit(at)) return at.offset;
+            parts++;
         }
-        return parts;
+        return at.cell + at.part;
     }
 
     void set_counts(part_position &at) const
