@@ -18,8 +18,8 @@ class piece_check
     /* Adds the next tag of the file, without its angle brackets. White space in it must be blanks. */
     void add_tag(const std::string &tag);
 
-    /* Throws std::runtime_error with the fields of the first piece that has others than piece 1. Pieces without points
-     * and, for fields of cells, pieces without cells may have any fields. */
+    /* Throws std::runtime_error with the fields of the first piece that has others than piece 1. Later pieces without
+     * points and, for fields of cells, later pieces without cells may have any fields. */
     void check(const std::string &path) const;
 
   private:
