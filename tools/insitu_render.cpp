@@ -108,7 +108,7 @@ class render_session
     insitu_vtk_report set(vtkDataObject *data, const std::vector<leaf_mesh> &leaves)
     {
         for (const leaf_mesh &leaf : leaves)
-            if (insitu_vtk_draw_by_corners(adaptor_, leaf.name.c_str(), leaf.has_faces) != INSITU_OK)
+            if (insitu_vtk_draw_by_corners(adaptor_, leaf.name.c_str(), leaf.has_polygons_or_polyhedra) != INSITU_OK)
                 throw std::runtime_error(insitu_vtk_error(adaptor_));
         insitu_vtk_report report;
         const insitu_status status = insitu_vtk_set(adaptor_, mesh_name, data, &report);
@@ -146,14 +146,14 @@ void agree_on_leaf_counts(const rank_info &w, std::vector<int> &leaf_counts)
 
 /* Makes all ranks agree on which leaves have polygons or polyhedra, beside which cells of higher order are drawn by
  * their corners. A rank may have none of the polyhedra of a leaf, or no part of the data at all. Collective. */
-void agree_on_faces(const rank_info &w, std::vector<leaf_mesh> &leaves)
+void agree_on_polygons_and_polyhedra(const rank_info &w, std::vector<leaf_mesh> &leaves)
 {
     int count = static_cast<int>(leaves.size());
     MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT, MPI_MAX, w.comm);
-    std::vector<unsigned char> has_faces(static_cast<size_t>(count));
-    for (size_t i = 0; i < leaves.size(); i++) has_faces[i] = leaves[i].has_faces;
-    MPI_Allreduce(MPI_IN_PLACE, has_faces.data(), count, MPI_UNSIGNED_CHAR, MPI_MAX, w.comm);
-    for (size_t i = 0; i < leaves.size(); i++) leaves[i].has_faces = has_faces[i] != 0;
+    std::vector<unsigned char> flags(static_cast<size_t>(count));
+    for (size_t i = 0; i < leaves.size(); i++) flags[i] = leaves[i].has_polygons_or_polyhedra;
+    MPI_Allreduce(MPI_IN_PLACE, flags.data(), count, MPI_UNSIGNED_CHAR, MPI_MAX, w.comm);
+    for (size_t i = 0; i < leaves.size(); i++) leaves[i].has_polygons_or_polyhedra = flags[i] != 0;
 }
 
 /* Returns, on rank 0, the lines in the texts of all ranks that are not in `seen` yet. Collective. */
@@ -289,7 +289,7 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
         add_empty_leaves(part.data, leaf_counts);
         leaves = list_leaf_meshes(part.data, mesh_name);
     });
-    agree_on_faces(w, leaves);
+    agree_on_polygons_and_polyhedra(w, leaves);
     run_on_all_ranks(w, [&] { report = on.set(part.data, leaves); });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
     const double time = agree_on_time(w, part.time, source.cycle(index));

@@ -430,12 +430,11 @@ void log_cells(const cell_counts &counts, const std::string &what, conversion_lo
 
 } // namespace insitu_vtk
 
-bool insitu_vtk_has_faces(vtkUnstructuredGrid *grid)
+bool insitu_vtk_has_polygons_or_polyhedra(vtkUnstructuredGrid *grid)
 {
     vtkUnsignedCharArray *types = grid->GetCellTypesArray();
     const vtkIdType count = types ? types->GetNumberOfValues() : 0;
-    bool has_faces = false;
-    for (vtkIdType i = 0; i < count && !has_faces; i++)
-        has_faces = insitu_vtk::excludes_higher_order(types->GetValue(i));
-    return has_faces;
+    bool is_found = false;
+    for (vtkIdType i = 0; i < count && !is_found; i++) is_found = insitu_vtk::excludes_higher_order(types->GetValue(i));
+    return is_found;
 }

@@ -153,18 +153,19 @@ void add_empty_leaves(vtkDataObject *data, const std::vector<int> &leaf_counts)
 
 std::vector<leaf_mesh> list_leaf_meshes(vtkDataObject *data, const std::string &name)
 {
-    const auto has_faces = [](vtkDataObject *leaf) {
+    const auto has_polygons_or_polyhedra = [](vtkDataObject *leaf) {
         auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf);
-        return grid && insitu_vtk_has_faces(grid);
+        return grid && insitu_vtk_has_polygons_or_polyhedra(grid);
     };
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!data) return {};
-    if (!composite) return {{name, has_faces(data)}};
+    if (!composite) return {{name, has_polygons_or_polyhedra(data)}};
     std::vector<leaf_mesh> leaves;
     const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
     it->SkipEmptyNodesOff();
     for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
-        leaves.push_back({name + "/" + std::to_string(leaves.size()), has_faces(it->GetCurrentDataObject())});
+        leaves.push_back(
+            {name + "/" + std::to_string(leaves.size()), has_polygons_or_polyhedra(it->GetCurrentDataObject())});
     return leaves;
 }
 

@@ -38,8 +38,8 @@ void add_empty_leaves(vtkDataObject *data, const std::vector<int> &leaf_counts);
 
 /* The mesh that a leaf of a data set becomes. */
 struct leaf_mesh {
-    std::string name;       // name that the VTK adaptor gives to the mesh if the leaf is not a structured block
-    bool has_faces = false; // true if the leaf has polygons, polyhedra or prisms (insitu_vtk_has_faces())
+    std::string name; // name that the VTK adaptor gives to the mesh if the leaf is not a structured block
+    bool has_polygons_or_polyhedra = false; // also true for prisms (insitu_vtk_has_polygons_or_polyhedra())
 };
 
 /* Lists the leaves of data, also the empty ones, in the order of VTK's iterator. `name` is the name of the mesh that a

@@ -32,7 +32,7 @@ INSITU_API vtkUnsignedCharArray *insitu_vtk_ghost_flags(vtkDataSetAttributes *da
 
 /* Returns whether grid has polygons, polyhedra, or prisms of five or six sides. insitu_vtk_set() draws cells of higher
  * order by their corners if they are in one grid with such cells. Local. */
-INSITU_API bool insitu_vtk_has_faces(vtkUnstructuredGrid *grid);
+INSITU_API bool insitu_vtk_has_polygons_or_polyhedra(vtkUnstructuredGrid *grid);
 
 } // extern "C"
 
