@@ -226,7 +226,7 @@ std::array<int, 3> choose_cut_normal(const vtkBoundingBox &bounds, const vector 
     return cut;
 }
 
-/* Reads a step of all ranks. The files given with --pieces are one step. */
+/* Reads all parts of a step, on whichever rank calls. The files given with --pieces are one step. */
 vtkSmartPointer<vtkDataObject> read_whole_step(const options &o, const step_source &source, size_t step)
 {
     const auto read = [](const std::string &path, size_t index) {

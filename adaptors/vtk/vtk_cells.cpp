@@ -154,7 +154,7 @@ template <typename Id> struct raw_cells {
     const Id *connectivity;
     int64_t count;
     bool are_higher_known;       /* true if cells of higher order are passed as they are. It is false if the grid also
-                                    contains polyhedra or polygons. */
+                                    contains polyhedra or polygons, or if the caller chose to draw by corners. */
     std::vector<bool> is_uneven; /* whether the order of each cell differs between axes; empty if no cell's does */
 
     const cell_conversion &conversion_of(int64_t cell) const

@@ -92,8 +92,8 @@ class face_streams
     }
 };
 
-/* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. A copy is the same
- * attributes (scalars, degrees of cells of higher order, ...) as its array. */
+/* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. A copy has the roles of
+ * its array among the attributes (scalars, degrees of cells of higher order, ...). */
 void extract_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
 {
     for (int i = 0; i < from->GetNumberOfArrays(); i++) {

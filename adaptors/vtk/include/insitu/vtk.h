@@ -17,9 +17,9 @@
  * The leaves of a composite are numbered in the order of VTK's iterator, including empty leaves. Images, rectilinear
  * and curvilinear grids become blocks of one mesh (insitu_set_block), so that there is no seam between them. In
  * overlapping AMR this mesh is called "name". In other composites, structured leaves with the fields a and b become
- * blocks of the mesh "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. A field of
- * cells or of several components has this after its name, as in "name/blocks of p (cells), u (3 components)". All other
- * leaves become the meshes "name/0", "name/1", ....
+ * blocks of the mesh "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. The name
+ * of a field of cells is followed by its centring, and that of a field of several components by their number, as in
+ * "name/blocks of p (cells), u (3 components)". All other leaves become the meshes "name/0", "name/1", ....
  *
  * The names contain the fields because all blocks of a mesh must have the same fields on all ranks, with the same
  * centring and number of components, and one rank does not know the fields of the other ranks' blocks. Scenes hardly
@@ -102,9 +102,9 @@ INSITU_API insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char 
                                         insitu_vtk_report *report);
 
 /* Chooses whether later calls of insitu_vtk_set() draw all cells of higher order of a mesh by their corners, even if
- * its grid on this rank has no polygons and polyhedra. `mesh` is the name of a whole mesh, such as "domain", or that of
- * a leaf of a composite, such as "domain/3". A grid whose cells are distributed over ranks is drawn the same on any
- * number of ranks only if all ranks choose this as soon as one rank's part has polygons or polyhedra. Local.
+ * its grid on this rank has neither polygons nor polyhedra. `mesh` is the name of a whole mesh, such as "domain", or
+ * that of a leaf of a composite, such as "domain/3". A grid whose cells are distributed over ranks is drawn the same on
+ * any number of ranks only if all ranks choose this as soon as one rank's part has polygons or polyhedra. Local.
  *
  * Returns INSITU_ERROR_ARGUMENT if adaptor or mesh is NULL, and INSITU_ERROR_MEMORY if memory runs out; the choice is
  * then unchanged. */
