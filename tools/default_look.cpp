@@ -25,11 +25,11 @@
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkUnstructuredGrid.h>
+#include <vtk_utf8.h>
 
 #include "data_file.h"
 #include "drawn_cells.h"
 #include "grids_of.h"
-#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -71,8 +71,9 @@ grid_list list_grids(vtkDataObject *data)
 bool is_field(vtkDataArray *array)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
-    return !name.empty() && is_utf8(name) && name.rfind("vtk", 0) != 0 && name != "GlobalNodeId" &&
-           name != "GlobalElementId" && name != "ObjectId" && name != "PedigreeNodeId" && name != "PedigreeElementId";
+    return !name.empty() && utf8::is_valid(name.begin(), name.end()) && name.rfind("vtk", 0) != 0 &&
+           name != "GlobalNodeId" && name != "GlobalElementId" && name != "ObjectId" && name != "PedigreeNodeId" &&
+           name != "PedigreeElementId";
 }
 
 void add_names(vtkFieldData *fields, std::vector<std::string> &names)

@@ -8,8 +8,9 @@
 #include <sstream>
 #include <system_error>
 
+#include <vtk_utf8.h>
+
 #include "file_kinds.h"
-#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -23,19 +24,17 @@ namespace
 std::string quoted(const std::string &text)
 {
     std::string out = "\"";
-    for (size_t at = 0; at < text.size();) {
-        uint32_t code = 0;
-        const size_t length = decode_character(text, at, code);
-        if (length == 0) code = static_cast<unsigned char>(text[at]);
+    for (auto at = text.begin(); at != text.end();) {
+        const bool is_character = utf8::find_invalid(at, text.end()) != at;
+        const uint32_t code = is_character ? utf8::next(at, text.end()) : static_cast<unsigned char>(*at++);
         if (code >= 0x20 && code < 0x7f) {
             if (code == '"' || code == '\\') out += '\\';
-            out += text[at];
+            out += static_cast<char>(code);
         } else {
             char escape[16];
             std::snprintf(escape, sizeof escape, "\\U%08x", static_cast<unsigned>(code));
             out += escape;
         }
-        at += std::max<size_t>(length, 1);
     }
     return out + '"';
 }

@@ -15,9 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include <vtk_utf8.h>
+
 #include "data_file.h"
 #include "part_files.h"
-#include "utf8_text.h"
 
 namespace render_tool
 {
@@ -69,7 +70,7 @@ void parse_camera(const std::string &text, options &o)
 
 void parse_field(const std::string &text, options &o)
 {
-    if (!is_utf8(text))
+    if (!utf8::is_valid(text.begin(), text.end()))
         throw std::runtime_error("--field " + text + ": is not UTF-8, and a scene cannot name such a field");
     o.field = text;
 }
