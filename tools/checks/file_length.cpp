@@ -14,6 +14,7 @@
 #include "legacy_check.h"
 #include "netcdf_size.h"
 #include "number_check.h"
+#include "xml_tag.h"
 
 namespace render_tool
 {
@@ -61,12 +62,6 @@ bool is_vtk_xml(const std::string &path)
            (ending.compare(0, 3, ".vt") == 0 && ending != ".vtk" && ending != ".vtkhdf");
 }
 
-/* Checks whether the attribute `name` of a tag is 0. */
-bool is_zero(const std::string &tag, const std::string &name)
-{
-    return tag.find(' ' + name + "=\"0\"") != std::string::npos;
-}
-
 } // namespace
 
 void check_length(const std::string &path)
@@ -90,11 +85,12 @@ void check_length(const std::string &path)
 bool is_empty_vtu(const std::string &path)
 {
     std::ifstream in(path, std::ios::binary);
-    for (std::string tag; std::getline(in, tag, '>');) {
-        tag.erase(0, tag.find('<') == std::string::npos ? 0 : tag.find('<'));
-        if (tag.compare(0, 6, "<Piece") == 0 && !(is_zero(tag, "NumberOfPoints") && is_zero(tag, "NumberOfCells")))
-            return false;
-        if (tag == "</UnstructuredGrid") return true;
+    int64_t offset = 0;
+    for (std::string tag; read_xml_tag(in.rdbuf(), offset, tag);) {
+        const bool has_data =
+            get_xml_attribute(tag, "NumberOfPoints") != "0" || get_xml_attribute(tag, "NumberOfCells") != "0";
+        if (tag.compare(0, 5, "Piece") == 0 && has_data) return false;
+        if (tag == "/UnstructuredGrid") return true;
     }
     return false;
 }

@@ -21,35 +21,12 @@ bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-bool is_blank(int c)
-{
-    return c == ' ' || (c >= '\t' && c <= '\r');
-}
-
 /* Advances `at` past the digits that begin at this index, if any; returns their number. */
 size_t skip_digits(const std::string &word, size_t &at)
 {
     const size_t first = at;
     while (at < word.size() && is_digit(word[at])) at++;
     return at - first;
-}
-
-/* Reads a tag or a comment, of which '<' has been read, up to its '>'. Returns what is in between, with a blank for
- * each white-space character; "" at the end of the file. A '>' in quotes or within a comment ends neither. */
-std::string read_tag(std::streambuf *in, int64_t &offset)
-{
-    std::string tag;
-    char quote = 0;
-    for (int c = in->sbumpc(); c != std::char_traits<char>::eof(); c = in->sbumpc()) {
-        offset++;
-        const bool is_comment = tag.compare(0, 3, "!--") == 0;
-        if (c == '>' && (is_comment ? tag.size() >= 5 && tag.compare(tag.size() - 2, 2, "--") == 0 : quote == 0))
-            return tag;
-        if (!is_comment && (c == '"' || c == '\'') && (quote == 0 || quote == c))
-            quote = quote == 0 ? static_cast<char>(c) : '\0';
-        tag += is_blank(c) ? ' ' : static_cast<char>(c);
-    }
-    return "";
 }
 
 /* Checks whether the element that begins with `tag` contains text values, which is the default of VTK's readers. */
@@ -98,11 +75,11 @@ void check_words(const std::string &path, std::streambuf *in, const number_type 
     std::string word;
     const int end = std::char_traits<char>::eof();
     for (int c = in->sgetc();; c = in->snextc(), offset++) {
-        if (c != end && c != '<' && !is_blank(c)) {
+        if (c != end && c != '<' && !is_xml_blank(c)) {
             word += static_cast<char>(c);
             continue;
         }
-        if (!word.empty() && !is_readable_number(word, is_blank(c), type))
+        if (!word.empty() && !is_readable_number(word, is_xml_blank(c), type))
             refuse_number(path, word, offset - static_cast<int64_t>(word.size()), type);
         word.clear();
         if (c == end || c == '<') return;
@@ -157,11 +134,8 @@ void check_xml_tags(const std::string &path)
     std::streambuf *bytes = in.rdbuf();
     int64_t offset = 0;
     piece_check pieces;
-    for (int c = bytes->sbumpc(); c != std::char_traits<char>::eof(); c = bytes->sbumpc()) {
-        offset++;
-        if (c != '<') continue;
-        const std::string tag = read_tag(bytes, offset);
-        if (tag.empty() || tag.compare(0, 12, "AppendedData") == 0) break;
+    for (std::string tag; read_xml_tag(bytes, offset, tag) && !tag.empty();) {
+        if (tag.compare(0, 12, "AppendedData") == 0) break;
         pieces.add_tag(tag);
         if (has_text_values(tag)) check_words(path, bytes, get_number_type(tag), offset);
     }
