@@ -59,36 +59,9 @@ void add_value(std::pair<double, double> &range, double value, bool &is_finite)
     range.second = std::max(range.second, value);
 }
 
-/* Flags of the visible cells of a grid and of their points. Both are empty if all are visible. */
-struct selection {
-    std::vector<bool> cells, points;
-};
-
 bool has(const std::vector<bool> &selected, vtkIdType i)
 {
     return selected.empty() || (i < static_cast<vtkIdType>(selected.size()) && selected[static_cast<size_t>(i)]);
-}
-
-selection select_visible(vtkUnstructuredGrid *grid)
-{
-    selection shown;
-    vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
-    if (!ghosts || ghosts->GetNumberOfValues() != grid->GetNumberOfCells()) return shown;
-    shown.cells.resize(static_cast<size_t>(grid->GetNumberOfCells()));
-    shown.points.resize(static_cast<size_t>(grid->GetNumberOfPoints()));
-    bool is_all = true;
-    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
-        if (ghosts->GetValue(i) & hiding_flags) {
-            is_all = false;
-            continue;
-        }
-        shown.cells[static_cast<size_t>(i)] = true;
-        vtkIdType count = 0;
-        const vtkIdType *points = nullptr;
-        grid->GetCellPoints(i, count, points);
-        for (vtkIdType k = 0; k < count; k++) shown.points[static_cast<size_t>(points[k])] = true;
-    }
-    return is_all ? selection{} : shown;
 }
 
 void add_array(vtkDataArray *array, const std::vector<bool> &selected, field_info &info)
@@ -128,9 +101,9 @@ void add_bounds(vtkPoints *points, const std::vector<bool> &selected, vtkBoundin
         if (has(selected, i)) bounds.AddPoint(points->GetPoint(i));
 }
 
-void add_grid(vtkUnstructuredGrid *grid, data_summary &all)
+void add_grid(vtkUnstructuredGrid *grid, bool only_drawn, data_summary &all)
 {
-    const selection shown = select_visible(grid);
+    const selection shown = only_drawn ? select_drawn_cells(grid) : select_visible_cells(grid);
     all.leaves++;
     all.points += grid->GetNumberOfPoints();
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++)
@@ -151,7 +124,7 @@ data_summary summarize(vtkDataObject *data, bool only_drawn)
     data_summary all;
     const auto add_leaf = [&](vtkDataObject *leaf) {
         auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf);
-        if (grid) add_grid(only_drawn ? extract_drawn_cells(grid) : vtkSmartPointer<vtkUnstructuredGrid>(grid), all);
+        if (grid) add_grid(grid, only_drawn, all);
     };
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) {

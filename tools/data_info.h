@@ -26,8 +26,8 @@ struct data_extent {
     bool has_range() const { return low[3] < high[3]; }
 };
 
-/* Extends the extent by the cells of data that extract_drawn_cells() returns. If there is no point field of this
- * name, the cell field is used. */
+/* Extends the extent by the cells of data that select_drawn_cells() selects. If there is no point field of this name,
+ * the cell field is used. */
 void add_extent(vtkDataObject *data, const std::string &field, data_extent &extent);
 
 } // namespace render_tool
