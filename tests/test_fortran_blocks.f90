@@ -182,23 +182,23 @@ contains
         call s%set_field('m', 'p', insitu_borrow(reals), status)
         plain = picture(s)
         call expect(len(plain) > 300 .or. rank /= 0, 'the picture of reals shows something')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i1), plain, 'integers of 1 byte')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i2), plain, 'integers of 2 bytes')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i4), plain, 'integers of 4 bytes')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i8), plain, 'integers of 8 bytes')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i1_before), plain, 'components of 1 byte')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i2_before), plain, 'components of 2 bytes')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i4_before), plain, 'components of 4 bytes')
-        call set_block_of_rank(s)
-        call same(s, insitu_borrow(i8_before), plain, 'components of 8 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i1), plain, 'integers of 1 byte')
+        call same_on_block_of_rank(s, insitu_borrow(i2), plain, 'integers of 2 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i4), plain, 'integers of 4 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i8), plain, 'integers of 8 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i1_before), plain, 'components of 1 byte')
+        call same_on_block_of_rank(s, insitu_borrow(i2_before), plain, 'components of 2 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i4_before), plain, 'components of 4 bytes')
+        call same_on_block_of_rank(s, insitu_borrow(i8_before), plain, 'components of 8 bytes')
     end subroutine integers_are_drawn_as_reals
+
+    subroutine same_on_block_of_rank(s, values, plain, what)
+        type(insitu_session), intent(inout) :: s
+        type(insitu_array), intent(in) :: values
+        character(*), intent(in) :: plain, what
+        call set_block_of_rank(s)
+        call same(s, values, plain, what)
+    end subroutine same_on_block_of_rank
 
     subroutine set_block_of_rank(s)
         type(insitu_session), intent(inout) :: s

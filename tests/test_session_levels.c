@@ -285,10 +285,23 @@ static void make_block(const levels *l, int number, block *out)
     if (l->is_mixed && number % 2) make_coordinates(out, l->off);
 }
 
+/* Sets a block and its field "f". values: one for each of the block's cells, or for each of its vertices. */
+static bool set_block_and_field(insitu_session *session, int number, const insitu_mesh *mesh, bool is_of_cells,
+                                const double *values)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.centring = is_of_cells ? INSITU_CELL : INSITU_VERTEX;
+    field.count = is_of_cells ? mesh->cell_count : mesh->vertex_count;
+    field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+    return insitu_set_block(session, "m", number, mesh) == INSITU_OK &&
+           insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
+}
+
 static bool set_block(insitu_session *session, int number, const levels *l, const block *b, bool is_new)
 {
     insitu_mesh mesh;
-    insitu_field field;
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = b->vertex_count;
     mesh.cell_count = b->cell_count;
@@ -296,13 +309,7 @@ static bool set_block(insitu_session *session, int number, const levels *l, cons
     if (b->places) insitu_mesh_interleaved(&mesh, b->places, INSITU_FLOAT64);
     if (b->flags) mesh.ghosts = (insitu_array){b->flags, INSITU_INT16, 0};
     if (!is_new) mesh.changed = INSITU_CHANGED_NOTHING;
-    insitu_field_defaults(&field);
-    field.name = "f";
-    field.centring = l->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
-    field.count = l->is_of_cells ? b->cell_count : b->vertex_count;
-    field.values = (insitu_array){b->values, INSITU_FLOAT64, 0};
-    return insitu_set_block(session, "m", number, &mesh) == INSITU_OK &&
-           insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
+    return set_block_and_field(session, number, &mesh, l->is_of_cells, b->values);
 }
 
 /* Makes the arrays of this rank's blocks; those of other ranks stay empty. */
@@ -726,18 +733,11 @@ static void set_two_levels(insitu_session *session, const two_levels *l, double 
             values[fine][i] =
                 compute_two_level_value(l, fine, (const int[]){i % wide, i / wide % wide, i / wide / wide});
         insitu_mesh mesh;
-        insitu_field field;
         insitu_mesh_defaults(&mesh);
-        insitu_field_defaults(&field);
         mesh.lattice = &lattice;
         mesh.cell_count = side * side * side;
         mesh.vertex_count = (side + 1) * (side + 1) * (side + 1);
-        field.name = "f";
-        field.centring = l->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
-        field.count = wide * wide * wide;
-        field.values = (insitu_array){values[fine], INSITU_FLOAT64, 0};
-        assert_int_equal(insitu_set_block(session, "m", fine, &mesh), INSITU_OK);
-        assert_int_equal(insitu_set_block_field(session, "m", fine, &field), INSITU_OK);
+        assert_true(set_block_and_field(session, fine, &mesh, l->is_of_cells, values[fine]));
     }
 }
 
@@ -877,20 +877,13 @@ static void make_strip(const quad_strips *q, int number, quad_strip *out)
 static bool submit_strip(insitu_session *session, const quad_strips *q, int number, const quad_strip *strip)
 {
     insitu_mesh mesh;
-    insitu_field field;
     insitu_mesh_defaults(&mesh);
-    insitu_field_defaults(&field);
     mesh.lattice = &strip->lattice;
     mesh.vertex_count = strip->vertex_count;
     mesh.cell_count = strip->cell_count;
     for (int axis = 0; axis < 3 && q->is_turned; axis++)
         mesh.coordinates[axis] = (insitu_array){&strip->places[0][axis], INSITU_FLOAT64, 24};
-    field.name = "f";
-    field.centring = q->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
-    field.count = q->is_of_cells ? strip->cell_count : strip->vertex_count;
-    field.values = (insitu_array){strip->values, INSITU_FLOAT64, 0};
-    return insitu_set_block(session, "m", number, &mesh) == INSITU_OK &&
-           insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
+    return set_block_and_field(session, number, &mesh, q->is_of_cells, strip->values);
 }
 
 /* Checks that hanging vertices of a strip have the values interpolated between the ends of the coarser edges, and that

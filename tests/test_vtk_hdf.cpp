@@ -70,6 +70,16 @@ void add_part(lists &all, int first, int count, double z, int step)
     all.id_counts.push_back(8 * count);
 }
 
+/* Adds a part that has the points of another part and their values, but reuses cells of an earlier part. */
+void add_part_with_earlier_cells(lists &all, const lists &points)
+{
+    all.points.insert(all.points.end(), points.points.begin(), points.points.end());
+    all.f.insert(all.f.end(), points.f.begin(), points.f.end());
+    all.point_counts.push_back(points.point_counts[0]);
+    all.cell_counts.push_back(points.cell_counts[0]);
+    all.id_counts.push_back(points.id_counts[0]);
+}
+
 class writer
 {
   public:
@@ -277,11 +287,7 @@ void points_that_move_keep_their_cells(void **)
         lists all, later;
         add_part(all, 0, 3, 0, 0);
         add_part(later, 5, 3, 1, 1);
-        all.points.insert(all.points.end(), later.points.begin(), later.points.end());
-        all.f.insert(all.f.end(), later.f.begin(), later.f.end());
-        all.point_counts.push_back(24);
-        all.cell_counts.push_back(3);
-        all.id_counts.push_back(24);
+        add_part_with_earlier_cells(all, later);
         w.write_dataset(all);
         w.write_steps({0, 1});
         w.write_dataset("Steps/PartOffsets", numbers{0, 1});
@@ -302,11 +308,7 @@ void cells_are_found_behind_a_step_without_cells(void **)
         add_part(all, 0, 0, 0, 0);
         add_part(all, 0, 3, 0, 0);
         add_part(later, 5, 3, 1, 1);
-        all.points.insert(all.points.end(), later.points.begin(), later.points.end());
-        all.f.insert(all.f.end(), later.f.begin(), later.f.end());
-        all.point_counts.push_back(24);
-        all.cell_counts.push_back(3);
-        all.id_counts.push_back(24);
+        add_part_with_earlier_cells(all, later);
         w.write_dataset(all);
         w.write_steps({0, 1, 2});
         w.write_dataset("Steps/PartOffsets", numbers{0, 1, 2});
